@@ -1,0 +1,1 @@
+"""OpenCL C sources, spliced and built by lutgen.device."""

@@ -1,0 +1,68 @@
+"""lutgen: precomputed lookup tables for real-time skin shading, from one Monte Carlo trace per wavelength.
+
+Names load on first use: `lutgen.load` and what it returns never import OpenCL.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from lutgen.axes import Axis, Grid
+    from lutgen.baking import bake
+    from lutgen.config import Recipe
+    from lutgen.errors import InputError, MachineError
+    from lutgen.lutset import LutSet
+    from lutgen.manifest import save
+    from lutgen.profiles import Profile
+    from lutgen.solvers import linear_srgb, profile, reflectance, spectrum
+    from lutgen.solvers.result import Reflectance
+    from lutgen.tissue import PRESETS, Layer, Skin, layers, preset
+
+_WHERE = {
+    "axes": ("Axis", "Grid"),
+    "baking": ("bake",),
+    "config": ("Recipe",),
+    "errors": ("InputError", "MachineError"),
+    "lutset": ("LutSet",),
+    "manifest": ("save",),
+    "profiles": ("Profile",),
+    "solvers": ("linear_srgb", "profile", "reflectance", "spectrum"),
+    "solvers.result": ("Reflectance",),
+    "tissue": ("PRESETS", "Layer", "Skin", "layers", "preset"),
+}
+_MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}
+
+__all__ = [
+    "PRESETS", "Axis", "Grid", "InputError", "Layer", "LutSet", "MachineError", "Profile", "Recipe", "Reflectance",
+    "Skin", "bake", "default_luts", "layers", "linear_srgb", "load", "preset", "profile", "reflectance", "save",
+    "spectrum",
+]  # fmt: skip
+
+
+def __getattr__(name: str):
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'lutgen' has no attribute {name!r}")
+    return getattr(import_module(f"lutgen.{_MODULE_OF[name]}"), name)
+
+
+def default_luts() -> Path:
+    """The folder of the default LUT set that comes with the package.
+
+    >>> default_luts().name
+    'default'
+    """
+    return Path(str(import_module("lutgen.luts").__file__)).parent / "default"
+
+
+def load(path: str | Path | None = None) -> LutSet:
+    """Load a LUT set from its folder (default: the one that comes with the package); InputError if it is not whole.
+
+    >>> load().color(0.0195, 0.7, 0.0088).round(2).tolist()
+    [0.46, 0.3, 0.2]
+    """
+    from lutgen import manifest
+
+    return manifest.load(default_luts() if path is None else path)

@@ -1,0 +1,98 @@
+"""Every command; the only place that reads argv, prints or exits."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from lutgen import errors
+
+DEFAULT_OUT = "lutgen-luts"
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str):
+        """Raise what `main` prints in one line."""
+        raise errors.InputError(f"{self.prog}: {message}; `{self.prog} --help` lists what is allowed")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="lutgen", description="Lookup tables for real-time skin shading, baked by Monte Carlo.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+
+    bake = commands.add_parser("bake", help="bake a LUT set into a folder")
+    bake.add_argument("recipe", nargs="?", help="TOML file; see luts/bake.toml (default: the quality as it is)")
+    bake.add_argument("--out", default=DEFAULT_OUT, metavar="DIR", help=f"folder to make (default: {DEFAULT_OUT})")
+    bake.add_argument("--quality", default="standard", help="draft, standard or reference: what the recipe starts from")
+    bake.add_argument("--photons", type=int, help="photons per wavelength")
+    bake.add_argument("--wavelengths", help="6, 8, 12, 10nm or 5nm")
+    bake.add_argument("--seed", type=int, help="seed of the random streams")
+    bake.add_argument("--force", action="store_true", help="replace an existing LUT set")
+    bake.set_defaults(run="lutgen.commands.bake")
+
+    swatch = commands.add_parser("swatch", help="color and spectrum of one skin")
+    swatch.add_argument("--preset", help="very-light, light, intermediate, tan, brown, dark, source-caucasian, …")
+    for name in ("melanin", "eumelanin", "hemoglobin", "oxygenation", "epidermis-mm"):
+        swatch.add_argument(f"--{name}", type=float)
+    swatch.add_argument("--scattering", help="source, bashkatov, jacques, saidi or donner")
+    swatch.add_argument("--saidi-a-per-mm", type=float, help="Saidi's fitted A (default: 5.7)")
+    swatch.add_argument("--saidi-b-nm4-per-mm", type=float, help="Saidi's fitted B (default: 8.4e10)")
+    swatch.add_argument("--reading", help="reduced, similarity or literal")
+    swatch.add_argument("--pipeline", default="default", help="default or source")
+    swatch.add_argument("--method", default="adding-doubling", help="adding-doubling or path-table")
+    swatch.add_argument("--photons", type=int, default=100_000, help="per wavelength, for path-table")
+    swatch.add_argument("--seed", type=int, default=0)
+    swatch.add_argument("--png", metavar="FILE", help="write a picture of the color")
+    swatch.set_defaults(run="lutgen.commands.swatch")
+
+    info = commands.add_parser("info", help="what a LUT set holds")
+    info.add_argument("dir", metavar="DIR")
+    info.set_defaults(run="lutgen.commands.info")
+
+    devices = commands.add_parser("devices", help="the OpenCL devices, best first")
+    devices.set_defaults(run="lutgen.commands.devices")
+
+    check = commands.add_parser("check", help="verify a LUT set: files, axes, laws, 100 nodes against adding-doubling")
+    check.add_argument("dir", metavar="DIR")
+    check.set_defaults(run="lutgen.commands.check")
+
+    bench = commands.add_parser("bench", help="speed of the trace, and time and error of a bake by stage")
+    bench.set_defaults(run="lutgen.commands.bench")
+
+    for command in (bake, swatch, bench):
+        command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
+    for command in (bake, swatch, info, devices, check, bench):
+        command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    return parser
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command and return its exit status: 0, 2 for bad input, 1 where the machine fails."""
+    try:
+        options = _parser().parse_args(arguments)
+        module, _, function = options.run.rpartition(".")
+        from importlib import import_module
+
+        result, text, status = getattr(import_module(module), function)(options)
+        print(json.dumps(result) if options.json else text)
+        return status
+    except errors.InputError as error:
+        print(f"lutgen: {error}", file=sys.stderr)
+        return 2
+    except (errors.MachineError, MemoryError) as error:
+        print(f"lutgen: {error or 'out of memory'}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        sys.stdout = open(Path("/dev/null"), "w")  # noqa: SIM115 - the reader left; say nothing at exit either
+        return 1
+    except KeyboardInterrupt:
+        print("lutgen: interrupted; nothing was written", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

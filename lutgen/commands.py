@@ -1,0 +1,207 @@
+"""What each command does: options in; a JSON-ready result, the same as text, and an exit status out."""
+
+from __future__ import annotations
+
+import platform
+import sys
+import time
+from argparse import Namespace
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from lutgen import color, config, manifest
+from lutgen.errors import InputError
+
+Outcome = tuple[dict, str, int]
+
+
+def seconds_since_start() -> float:
+    """Seconds since this process started, imports included; 0 where the system does not say."""
+    try:
+        ticks = int(Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()[19])
+        import os
+
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, ValueError, AttributeError):
+        return 0.0
+
+
+def bake(options: Namespace) -> Outcome:
+    """`lutgen bake`: recipe and options to a folder."""
+    from lutgen import baking
+
+    imports = seconds_since_start()
+    base = config.quality(options.quality)
+    recipe = config.load(options.recipe, base) if options.recipe else base
+    changes = {key: getattr(options, key) for key in ("photons", "wavelengths", "seed")}
+    recipe = replace(recipe, **{key: value for key, value in changes.items() if value is not None})
+    out = Path(options.out)
+    manifest.check_target(out, options.force)
+    with _Progress(quiet=options.json) as progress:
+        luts = baking.bake(recipe, device=options.device, progress=progress)
+        progress("write", None)
+        written = time.perf_counter()
+        luts.manifest["seconds"] = {"imports": round(imports, 4), **luts.manifest["seconds"]}
+        notes = {"host": platform.node(), "baked_at": time.strftime("%Y-%m-%dT%H:%M:%S%z")}
+        manifest.save(luts, out, options.force, notes)
+    seconds = luts.manifest["seconds"] | {
+        "write": round(time.perf_counter() - written, 4), "total": round(seconds_since_start(), 4),
+    }  # fmt: skip
+    error, trace = luts.manifest["error"], luts.manifest["trace"]
+    result = {"out": str(out.absolute()), "recipe": recipe.as_dict(), "device": trace["device"], "error": error,
+              "seconds": seconds}  # fmt: skip
+    text = (
+        f"{out.absolute()}\n"
+        f"color: ΔE00 max {error['color']['delta_e00_max']:.3f}, p95 {error['color']['delta_e00_p95']:.3f} "
+        f"({error['color']['skins']} random skins against {error['color']['compared_with']})\n"
+        f"profiles: EE difference max {error['profile']['ee_difference_max']:.4f} between nodes "
+        f"({error['profile']['skins']} random skins)\n"
+        f"{trace['events'] / 1e6:.0f} M scattering events on {trace['device']}; "
+        + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
+    )
+    return result, text, 0
+
+
+class _Progress:
+    """A rich progress bar on a terminal, nothing elsewhere; called with the stage and, in the trace, a tally."""
+
+    def __init__(self, quiet: bool):
+        self._bar = None
+        if not quiet and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+            self._bar = Progress(
+                TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rate]}"),
+                TimeRemainingColumn(), console=Console(stderr=True), transient=True,
+            )  # fmt: skip
+            self._task = self._bar.add_task("start", total=None, rate="")
+            self._since = time.perf_counter()
+
+    def __enter__(self):
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_):
+        if self._bar:
+            self._bar.stop()
+
+    def __call__(self, stage: str, tally) -> None:
+        if not self._bar:
+            return
+        if tally is None:
+            self._since = time.perf_counter()
+            self._bar.update(self._task, description=stage, total=None, completed=0, rate="")
+        else:
+            rate = f"{tally.events / (time.perf_counter() - self._since) / 1e6:.0f} M events/s"
+            self._bar.update(self._task, total=tally.of, completed=tally.photons, rate=rate)
+
+
+def swatch(options: Namespace) -> Outcome:
+    """`lutgen swatch`: one skin's spectrum and color."""
+    from lutgen import solvers
+    from lutgen.tissue import Skin, preset
+
+    fields = ("melanin", "eumelanin", "hemoglobin", "oxygenation", "epidermis_mm", "scattering", "reading",
+              "saidi_a_per_mm", "saidi_b_nm4_per_mm")  # fmt: skip
+    given = {name: getattr(options, name) for name in fields if getattr(options, name) is not None}
+    if options.preset is None and "melanin" not in given:
+        raise InputError("swatch: --preset or --melanin is needed; for example `lutgen swatch --preset light`")
+    base = preset(options.preset) if options.preset else Skin(0.0195, 0.7, 0.0088)
+    skin = replace(base, **given)
+    extra = {"photons": options.photons, "seed": options.seed, "device": options.device}
+    reflectance, sigma = solvers.spectrum_with_error(
+        skin, None, options.method, **(extra if options.method == "path-table" else {})
+    )
+    xyz = color.spectrum_to_xyz(reflectance, options.pipeline)
+    srgb = color.from_xyz(xyz, "srgb", options.pipeline)
+    result = {
+        "skin": asdict(skin), "method": options.method, "pipeline": options.pipeline,
+        "wavelength_nm": color.tables()["wavelength_nm"].tolist(), "reflectance": reflectance.tolist(),
+        "std_error": sigma.tolist(), "xyz": xyz.tolist(), "linear_srgb": srgb.tolist(),
+        "lab": color.lab(xyz).tolist(), "srgb_hex": color.hex_code(srgb),
+    }  # fmt: skip
+    lightness, a, b = result["lab"]
+    text = (
+        f"{result['srgb_hex']}  L* {lightness:.2f}  a* {a:.2f}  b* {b:.2f}  "
+        f"linear sRGB {srgb[0]:.4f} {srgb[1]:.4f} {srgb[2]:.4f}"
+    )
+    if options.png:
+        from lutgen import preview
+
+        try:
+            preview.draw_swatch(skin, result).save(options.png, format="PNG")
+        except OSError as error:
+            raise InputError(f"png = {options.png}: cannot be written ({error.strerror or error})") from error
+    return result, text, 0
+
+
+def info(options: Namespace) -> Outcome:
+    """`lutgen info`: the manifest, in words."""
+    folder = Path(options.dir)
+    luts = manifest.load(folder)
+    facts = luts.manifest
+    lines = [f"{folder.absolute()}: LUT set of lutgen {facts['lutgen']}, {facts['recipe']['totals']} totals"]
+    for name, grid in (("color", luts.color_lut.grid), ("profile", luts.profile_lut.grid)):
+        axes = (grid.melanin, grid.eumelanin, grid.hemoglobin)
+        lines.append(
+            f"{name}: " + ", ".join(f"{a.name} {a.low:g} to {a.high:g} ({a.count}, {a.spacing})" for a in axes)
+        )
+    nm = ", ".join(f"{w:g}" for w in facts["quadrature"]["wavelength_nm"])
+    rings = len(luts.paths.radius_edges_mm) - 1
+    lines.append(f"profiles: {rings} rings to {luts.paths.radius_edges_mm[-1]:g} mm")
+    lines.append(f"skin: {', '.join(f'{key} {value}' for key, value in facts['recipe']['skin'].items())}")
+    lines.append(f"wavelengths: {nm} nm; {facts['trace']['photons_per_wavelength']} photons each, "
+                 f"seed {facts['trace']['seed']}, on {facts['trace']['device']}")  # fmt: skip
+    found = facts["error"]["color"]
+    lines.append(f"color: ΔE00 max {found['delta_e00_max']:.3f}, p95 {found['delta_e00_p95']:.3f} against "
+                 f"{found['compared_with']}")  # fmt: skip
+    sizes = {name: (folder / name).stat().st_size for name in manifest.FILES}
+    lines += [f"{name}: {size / 1000:.0f} kB" for name, size in sizes.items()]
+    return facts | {"bytes": sizes}, "\n".join(lines), 0
+
+
+def devices(options: Namespace) -> Outcome:
+    """`lutgen devices`: what OpenCL offers, best first."""
+    from lutgen import device as ocl
+
+    found = ocl.devices()
+    ocl.choose()  # says what to install where there is none
+    rows = [
+        {"index": i, "name": d.name, "platform": d.platform, "kind": d.kind, "lanes": d.lanes}
+        for i, d in enumerate(found)
+    ]
+    text = "\n".join(f"{r['index']}  {r['kind']}  {r['platform']}: {r['name']}  ({r['lanes']} lanes)" for r in rows)
+    return {"devices": rows}, text, 0
+
+
+def check(options: Namespace) -> Outcome:
+    """`lutgen check`: every law that a LUT set must obey."""
+    from lutgen import checking
+
+    findings = checking.check(Path(options.dir))
+    good = all(finding.passed for finding in findings)
+    text = "\n".join(f"{'ok  ' if f.passed else 'FAIL'}  {f.name}: {f.detail}" for f in findings)
+    return {"passed": good, "findings": [asdict(f) for f in findings]}, text, 0 if good else 2
+
+
+def bench(options: Namespace) -> Outcome:
+    """`lutgen bench`: events per second, lanes against one lane, and a bake by stage."""
+    from lutgen import benchmark
+
+    result = benchmark.run(options.device)
+    trace, baked = result["trace"], result["bake"]
+    text = (
+        f"trace on {trace['device']}: {trace['events_per_s'] / 1e9:.2f} G events/s, "
+        f"{trace['photons_per_s'] / 1e6:.2f} M photons/s, {trace['lanes']} lanes are {trace['ratio_w1']:.1f} × one; "
+        f"{100 * trace['peak_share']:.0f} % of the measured multiply-add peak\n"
+        + "\n".join(
+            f"{quality}: {run['seconds']['total']:.2f} s, ΔE00 max {run['error']['color']['delta_e00_max']:.3f}, "
+            f"p95 {run['error']['color']['delta_e00_p95']:.3f}; "
+            + ", ".join(f"{name} {value:.2f}" for name, value in run["seconds"].items() if name != "total")
+            for quality, run in baked.items()
+        )
+        + f"\nexpansion to another oxygenation: {1000 * result['expand_s']:.1f} ms"
+    )
+    return result, text, 0

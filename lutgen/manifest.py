@@ -1,0 +1,239 @@
+"""LUT sets on disk: color.exr, profile.exr, paths.exr, preview.png and manifest.json in one folder, whole or absent."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import json
+import os
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from lutgen import exr
+from lutgen.axes import Axis, Grid
+from lutgen.color import ACESCG_FROM_XYZ
+from lutgen.errors import InputError, MachineError
+from lutgen.lutset import ColorLut, LutSet, ProfileLut
+from lutgen.paths import PathTable
+
+FORMAT = 1
+EXR_FILES = ("color.exr", "profile.exr", "paths.exr")
+FILES = (*EXR_FILES, "preview.png")
+
+MEANING = {
+    "color": "share of incident light that leaves diffusely, light collimated along the normal from air; includes the "
+    "entry transmission 1 - R_specular (0.9722 at n 1.4), excludes the specular part. Multiply irradiance by "
+    "T(theta)/T(0) with your own Fresnel, never by 1 - F again. At other incidence the true value moves: "
+    "R(60 deg)/R(0) is 0.91 to 1.28, hemispherical/R(0) 0.92 to 1.15, most on dark skin",
+    "space": "linear, unclipped, scene-referred ACEScg (AP1 primaries, ACES white) under D65; adapted by CAT02",
+    "acescg_from_xyz_d65": ACESCG_FROM_XYZ.tolist(),
+    "color_exr": "strip: within a tile melanin along x, tiles along eumelanin, hemoglobin along y, first row lowest",
+    "texture_coordinate": "u = (x (N - 1) + 0.5) / N with x in 0 to 1 after the axis warp; a one-node axis has u = 0.5",
+    "profile_exr": "part energy: row = node (melanin fastest, then eumelanin, then hemoglobin), column = ring, "
+    "normalized per channel: totals come from color.exr. Part taps: node x 64 quantiles of the widest channel, "
+    "radius in mm and encircled energy per channel. Part clamped: negative share cut off per node and channel",
+    "paths_exr": "Laplace table: row = wavelength x ring, column = epidermis node x dermis node; "
+    "share of incident light leaving in that ring at those absorptions (Chebyshev nodes in their cube roots)",
+}
+
+
+def grid_entry(grid: Grid) -> dict:
+    """A grid's axes as plain values."""
+    return {name: asdict(getattr(grid, name)) for name in ("melanin", "eumelanin", "hemoglobin")}
+
+
+def _grid(entry: dict) -> Grid:
+    return Grid(**{name: Axis(**axis) for name, axis in entry.items()})
+
+
+def _parts(luts: LutSet) -> dict[str, list[exr.Part]]:
+    """The EXR files' images; every file carries what its numbers depend on, and no time or host."""
+    facts = {
+        key: luts.manifest[key]
+        for key in ("lutgen", "recipe", "meaning", "quadrature", "trace", "optical_data", "extra_absorbers_per_mm")
+    }
+    facts["format"] = FORMAT
+    N_h, N_e, N_m = luts.color_lut.grid.shape
+    strip = luts.color_lut.acescg.astype("f4").reshape(N_h, N_e * N_m, 3)
+    color_facts = facts | {"grid": grid_entry(luts.color_lut.grid)}
+    profile = luts.profile_lut
+    nodes = int(np.prod(profile.grid.shape))
+    edges = profile.radius_edges_mm.tolist()
+    profile_facts = facts | {"grid": grid_entry(profile.grid), "radius_edges_mm": edges}
+    energy = profile.shape.astype("f4").reshape(nodes, -1, 3)
+    taps = profile.taps.astype("f4").reshape(nodes, -1, 4)
+    taps_channels = {"radius_mm": taps[..., 0], **exr.rgb(taps[..., 1:])}
+    clamped = profile.clamped_share.astype("f4").reshape(nodes, 1, 3)
+    paths = luts.paths
+    K, B, E, D = paths.energy.shape
+    path_facts = facts | {
+        "radius_edges_mm": edges, "wavelength_nm": paths.wavelength_nm.tolist(), "nu_per_mm": paths.nu_per_mm.tolist(),
+        "mu_epidermis": paths.mu_epidermis.tolist(), "mu_dermis": paths.mu_dermis.tolist(),
+        "photons": paths.photons, "entry": paths.entry,
+    }  # fmt: skip
+    return {
+        "color.exr": [exr.Part("color", exr.rgb(strip), color_facts)],
+        "profile.exr": [
+            exr.Part("energy", exr.rgb(energy), profile_facts),
+            exr.Part("taps", taps_channels, profile_facts),
+            exr.Part("clamped", exr.rgb(clamped), profile_facts),
+        ],
+        "paths.exr": [exr.Part("paths", {"Y": paths.energy.reshape(K * B, E * D).astype("f4")}, path_facts)],
+    }
+
+
+def save(luts: LutSet, out: str | Path, force: bool = False, notes: dict | None = None) -> Path:
+    """Write a set to the folder `out`; it is there whole or not at all. `notes` (times, host) go into the manifest.
+
+    Files go to a sibling folder, are synced, and the folder is renamed. With `force` an old set is first moved
+    aside, then deleted. Raises InputError where `out` exists or cannot be written, MachineError on a full disk.
+    """
+    out = Path(out)
+    check_target(out, force)
+    partial, old = _sibling(out, "partial"), _sibling(out, "old")
+    try:
+        partial.mkdir()
+        for name, parts in _parts(luts).items():
+            exr.write(partial / name, parts)
+        from lutgen import preview
+
+        preview.draw(luts).save(partial / "preview.png")
+        hashes = {name: hashlib.sha256((partial / name).read_bytes()).hexdigest() for name in FILES}
+        manifest = luts.manifest | {"format": FORMAT, "files": hashes} | (notes or {})
+        (partial / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+        for path in (*partial.iterdir(), partial):
+            _sync(path)
+        if out.exists():
+            out.rename(old)
+        partial.rename(out)
+        _sync(out.parent)
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT) or "No space left" in str(error)
+        kind = MachineError if full else InputError
+        advice = "free some space" if full else "choose another folder"
+        raise kind(f"out = {out}: cannot be written ({error.strerror or error}); {advice}") from error
+    finally:
+        if old.exists() and not out.exists():
+            old.rename(out)
+        for leftover in (partial, old):
+            shutil.rmtree(leftover, ignore_errors=True)
+    return out
+
+
+def check_target(out: Path, force: bool) -> None:
+    """Raise InputError, before any work, where a set cannot be written to `out`; clear what killed bakes left."""
+    if out.exists() or out.is_symlink():
+        if not force:
+            raise InputError(f"out = {out}: exists; give another folder, or --force to replace it")
+        if not out.is_dir() or (any(out.iterdir()) and not (out / "manifest.json").exists()):
+            raise InputError(f"out = {out}: is not a LUT set, so --force does not replace it; give another folder")
+    parent = out.absolute().parent
+    if not parent.is_dir():
+        raise InputError(f"out = {out}: there is no folder {parent}; make it first")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise InputError(f"out = {out}: folder {parent} cannot be written; choose another folder")
+    for leftover in parent.glob(f".{out.name}.*-*"):
+        kind, _, process = leftover.name.removeprefix(f".{out.name}.").partition("-")
+        if kind in ("partial", "old") and process.isdigit() and not _running(int(process)):
+            if kind == "old" and not out.exists():
+                leftover.rename(out)  # a replacement was killed between its two renames: the old set comes back
+                return check_target(out, force)
+            shutil.rmtree(leftover, ignore_errors=True)
+    return None
+
+
+def _running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _sibling(out: Path, kind: str) -> Path:
+    return out.absolute().parent / f".{out.name}.{kind}-{os.getpid()}"
+
+
+def _sync(path: Path) -> None:
+    with contextlib.suppress(PermissionError):  # Windows cannot open folders
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def load(path: str | Path) -> LutSet:
+    """Load and verify a set's folder; InputError where a file is missing, truncated, foreign or of another bake.
+
+    >>> import lutgen
+    >>> lutgen.load().color_lut.grid.shape
+    (16, 8, 16)
+    """
+    folder = Path(path)
+    manifest = read_manifest(folder)
+    for name in EXR_FILES:
+        _verify(folder, name, manifest)
+    images = {name: exr.read(folder / name) for name in EXR_FILES}
+    try:
+        return _assemble(images, manifest)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, InputError):
+            raise InputError(f"{folder}: {error}; bake it anew") from error
+        raise InputError(f"{folder}: manifest and EXR files disagree ({error!r}); bake it anew") from error
+
+
+def read_manifest(folder: Path) -> dict:
+    """A set's manifest; InputError where the folder holds none that this version understands."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError(f"{folder}: no LUT set there (no manifest.json); bake one with `lutgen bake`") from error
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder}: manifest.json cannot be read ({error}); bake it anew") from error
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        found = manifest.get("format") if isinstance(manifest, dict) else None
+        raise InputError(f"{folder}: manifest format = {found!r}: this version reads {FORMAT}; bake it anew")
+    return manifest
+
+
+def _verify(folder: Path, name: str, manifest: dict) -> None:
+    try:
+        found = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{folder / name}: cannot be read ({error.strerror}); bake the set anew") from error
+    if found != manifest.get("files", {}).get(name):
+        raise InputError(f"{folder / name}: is not the file that manifest.json names (SHA-256 differs); bake it anew")
+
+
+def _assemble(images: dict[str, dict[str, exr.Part]], manifest: dict) -> LutSet:
+    strip = images["color.exr"]["color"]
+    energy, clamped = (images["profile.exr"][name] for name in ("energy", "clamped"))
+    stored = images["paths.exr"]["paths"]
+    for part, key in ((strip, "color_grid"), (energy, "profile_grid")):
+        if part.attributes["grid"] != manifest[key]:
+            raise ValueError(f"the axes of {part.name} are not the manifest's {key}")
+    for key in ("recipe", "quadrature"):
+        if strip.attributes[key] != manifest[key]:
+            raise ValueError(f"the {key} of color.exr is not the manifest's")
+    color_grid, profile_grid = _grid(manifest["color_grid"]), _grid(manifest["profile_grid"])
+    facts = stored.attributes
+    mu_e, mu_d = np.array(facts["mu_epidermis"]), np.array(facts["mu_dermis"])
+    edges = np.array(facts["radius_edges_mm"])
+    paths = PathTable(
+        np.array(facts["wavelength_nm"]), np.array(facts["nu_per_mm"]), edges, mu_e, mu_d,
+        stored.channels["Y"].reshape(len(mu_e), len(edges) - 1, mu_e.shape[1], mu_d.shape[1]),
+        facts["photons"], facts["entry"],
+    )  # fmt: skip
+    profile = ProfileLut(
+        profile_grid, edges,
+        energy.stack("RGB").reshape(*profile_grid.shape, len(edges) - 1, 3),
+        clamped.stack("RGB").reshape(*profile_grid.shape, 3),
+    )  # fmt: skip
+    return LutSet(ColorLut(color_grid, strip.stack("RGB").reshape(*color_grid.shape, 3)), profile, paths, manifest)

@@ -1,0 +1,15 @@
+"""What a solver returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Reflectance:
+    """Shares of light that fell along the normal: diffuse, specular, transmitted; std_error is the diffuse share's."""
+
+    diffuse: float
+    specular: float
+    transmitted: float = 0.0
+    std_error: float = 0.0

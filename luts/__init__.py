@@ -1,0 +1,1 @@
+"""The default LUT set (default/) and its recipe (bake.toml)."""

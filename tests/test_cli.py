@@ -1,0 +1,222 @@
+"""Commands as a user types them: results, one-line errors, exit statuses."""
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import lutgen
+from lutgen import checking, cli, color, manifest
+from lutgen import device as ocl
+
+
+def run(capsys, *arguments):
+    status = cli.main([str(a) for a in arguments])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_bake_info_check(capsys, tmp_path):
+    out = tmp_path / "luts"
+    status, text, err = run(capsys, "bake", "--quality", "draft", "--photons", 8192, "--out", out)
+    assert (status, err) == (0, "")
+    assert text.splitlines()[0] == str(out)
+    assert "ΔE00 max" in text
+    assert sorted(p.name for p in out.iterdir()) == [
+        "color.exr",
+        "manifest.json",
+        "paths.exr",
+        "preview.png",
+        "profile.exr",
+    ]
+    with Image.open(out / "preview.png") as picture:
+        assert picture.size[0] > 600
+    status, text, _ = run(capsys, "info", out)
+    assert status == 0
+    assert "melanin 0.001 to 0.5 (16, cbrt)" in text
+    status, text, _ = run(capsys, "check", out)
+    assert status == 0, text
+    assert "FAIL" not in text
+    status, text, _ = run(capsys, "check", out, "--json")
+    assert json.loads(text)["passed"]
+
+
+def test_bake_json_is_one_object(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "lutgen.cli", "bake", "--quality", "draft", "--json", "--out", str(tmp_path / "x")],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    result = json.loads(done.stdout)
+    assert done.stderr == ""
+    assert result["error"]["color"]["delta_e00_max"] < 1.5
+    assert {"imports", "trace", "exact totals", "expand", "measure", "write", "total"} <= set(result["seconds"])
+
+
+def test_recipe_file_and_options_override_each_other_in_order(capsys, tmp_path):
+    recipe = tmp_path / "r.toml"
+    recipe.write_text('photons = 4096\nwavelengths = "6"\nseed = 3\n')
+    status, text, _ = run(capsys, "bake", recipe, "--seed", 4, "--out", tmp_path / "x", "--json")
+    assert status == 0
+    made = json.loads(text)["recipe"]
+    assert (made["photons"], made["wavelengths"], made["seed"]) == (4096, "6", 4)
+
+
+def test_swatch_prints_color_and_json(capsys, tmp_path):
+    status, text, _ = run(capsys, "swatch", "--preset", "dark", "--png", tmp_path / "dark.png")
+    assert status == 0
+    assert text.startswith("#")
+    status, text, _ = run(capsys, "swatch", "--melanin", 0.158, "--hemoglobin", 0.018, "--json")
+    result = json.loads(text)
+    assert (len(result["wavelength_nm"]), len(result["reflectance"]), len(result["std_error"])) == (81, 81, 81)
+    expected = lutgen.linear_srgb(lutgen.preset("dark"))
+    assert result["linear_srgb"] == pytest.approx(expected.tolist(), abs=1e-12)
+    assert result["srgb_hex"] == color.hex_code(expected)
+    assert np.allclose(color.lab(result["xyz"]), result["lab"])
+    picture = Image.open(tmp_path / "dark.png").convert("RGB")
+    wanted = tuple(int(result["srgb_hex"][i : i + 2], 16) for i in (1, 3, 5))
+    assert wanted in {rgb for _, rgb in picture.getcolors(1 << 24) or []}
+
+
+def test_swatch_by_monte_carlo_agrees_with_its_sigma(capsys):
+    status, text, _ = run(capsys, "swatch", "--preset", "tan", "--method", "path-table", "--photons", 20000, "--json")
+    assert status == 0
+    found, exact = json.loads(text), lutgen.spectrum(lutgen.preset("tan"))
+    z = (np.array(found["reflectance"]) - exact) / np.array(found["std_error"])
+    assert np.abs(z).max() < 4.5
+    assert 0.6 < z.std() < 1.4
+
+
+def test_devices_lists_what_is_there(capsys):
+    status, text, _ = run(capsys, "devices", "--json")
+    assert status == 0
+    found = json.loads(text)["devices"]
+    assert found[0]["lanes"] in (1, 4, 8, 16)
+
+
+def test_bench_reports_the_trace_and_the_bakes(capsys, monkeypatch):
+    from lutgen import benchmark
+
+    monkeypatch.setattr(benchmark, "ROUNDS", 1)
+    monkeypatch.setattr(benchmark, "_PHOTONS", {"lanes": 8192, "one lane": 2048})
+    status, text, _ = run(capsys, "bench", "--json")
+    assert status == 0
+    result = json.loads(text)
+    assert {"events_per_s", "photons_per_s", "ratio_w1"} <= set(result["trace"])
+    assert set(result["bake"]) == {"draft", "standard", "reference"}
+
+
+BAD = [
+    (["bake", "--photons", "0"], "photons = 0: allowed is a whole number 1 to 2147483647"),
+    (["bake", "--photons", "many"], "invalid int value: 'many'"),
+    (["bake", "--quality", "best"], "quality = 'best': allowed is draft, standard, reference"),
+    (["bake", "--wavelengths", "9"], "wavelengths = '9': allowed is 6, 8, 12, 10nm, 5nm"),
+    (["bake", "--device", "abacus"], "device = 'abacus': no device matches"),
+    (["bake", "absent.toml"], "recipe absent.toml: cannot be read"),
+    (["bake", "--out", "/proc/x"], "out = /proc/x"),
+    (["swatch"], "--preset or --melanin is needed"),
+    (["swatch", "--preset", "pale"], "preset = 'pale': allowed is very-light, light"),
+    (["swatch", "--melanin", "nan"], "melanin = nan: allowed is 0.001 to 0.5"),
+    (["swatch", "--preset", "light", "--method", "magic"], "method = 'magic': allowed is path-table, adding-doubling"),
+    (["swatch", "--preset", "light", "--scattering", "donner", "--method", "path-table"], "use method adding-doubling"),
+    (["swatch", "--preset", "light", "--png", "/proc/x.png"], "png = /proc/x.png: cannot be written"),
+    (["info", "/absent"], "/absent: no LUT set there"),
+    (["check", "/absent"], "/absent: no LUT set there"),
+    (["paint"], "invalid choice: 'paint'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=lambda v: " ".join(v) if isinstance(v, list) else "")
+def test_bad_input_is_one_line_status_2_and_nothing_written(capsys, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.startswith("lutgen: ")
+    assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_existing_folder_is_refused_before_any_work(capsys, tmp_path):
+    status, _, err = run(capsys, "bake", "--out", tmp_path)
+    assert status == 2
+    assert "exists" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_opencl_is_one_line_status_1(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(ocl, "devices", lambda: ())
+    ocl.choose.cache_clear()
+    try:
+        for arguments in (["devices"], ["bake", "--out", tmp_path / "x"]):
+            status, _, err = run(capsys, *arguments)
+            assert status == 1
+            assert 'pip install "lutgen[cpu]"' in err
+            assert err.count("\n") == 1
+    finally:
+        ocl.choose.cache_clear()
+    assert not list(tmp_path.iterdir())
+
+
+def test_full_disk_is_status_1(capsys, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(manifest.exr, "write", full)
+    status, _, err = run(capsys, "bake", "--quality", "draft", "--photons", 2048, "--out", tmp_path / "x")
+    assert status == 1
+    assert "No space left on device" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_device_is_taken_from_the_environment(monkeypatch):
+    monkeypatch.setenv("LUTGEN_DEVICE", "abacus")
+    ocl.choose.cache_clear()
+    with pytest.raises(lutgen.InputError, match="abacus"):
+        ocl.choose()
+    ocl.choose.cache_clear()
+
+
+def test_the_runtime_that_pip_brings_serves_too(tmp_path):
+    """[cpu]: found by itself, listed, and a bake on it agrees with adding-doubling."""
+    environment = {k: v for k, v in os.environ.items() if k != "LUTGEN_DEVICE"}
+    command = [sys.executable, "-m", "lutgen.cli", "bake", "--quality", "draft", "--device", "Intel", "--json", "--out"]
+    done = subprocess.run([*command, str(tmp_path / "x")], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["error"]["color"]["delta_e00_max"] < 1.5
+
+
+@pytest.mark.parametrize("harm", ["node", "rise", "nan", "preview"])
+def test_check_finds_what_is_wrong(capsys, draft, draft_dir, tmp_path, harm):
+    folder = tmp_path / "set"
+    shutil.copytree(draft_dir, folder)
+    if harm == "preview":
+        (folder / "preview.png").write_bytes(b"other")
+    else:
+        cells = draft.color_lut.acescg.copy()
+        if harm == "node":
+            cells *= 1.02
+        elif harm == "rise":
+            cells[3, 2, 5] = cells[3, 2, 4] * 1.1
+        else:
+            cells[0, 0, 0, 0] = np.nan
+        harmed = replace(draft, color_lut=replace(draft.color_lut, acescg=cells))
+        manifest.exr.write(folder / "color.exr", manifest._parts(harmed)["color.exr"])
+        facts = json.loads((folder / "manifest.json").read_text())
+        facts["files"]["color.exr"] = hashlib.sha256((folder / "color.exr").read_bytes()).hexdigest()
+        (folder / "manifest.json").write_text(json.dumps(facts))
+    status, text, _ = run(capsys, "check", folder)
+    assert status == 2
+    assert "FAIL" in text
+
+
+def test_check_allows_what_chance_allows(draft_dir):
+    nodes = next(f for f in checking.check(draft_dir) if f.name == "nodes")
+    assert nodes.passed
+    assert "100 random nodes" in nodes.detail

@@ -1,0 +1,125 @@
+"""The layout: imports point down, the wheel's only top-level name is lutgen, no heavy import on a light path."""
+
+import ast
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+LEVELS = [
+    {"cli"},
+    {"commands", "benchmark", "checking"},
+    {"baking"},
+    {"solvers"},
+    {"manifest", "preview", "device", "exr", "lutset", "expansion"},
+    {"config", "paths", "profiles", "quadrature"},
+    {"axes", "tissue", "color"},
+    {"chromophores"},
+    {"errors"},
+]
+HEAVY = {"pyopencl": {"device"}, "OpenEXR": {"exr"}, "colour": {"data"}, "scipy": {"data"}, "moderngl": set()}
+
+
+def modules():
+    for path in sorted((ROOT / "lutgen").rglob("*.py")):
+        yield path, path.relative_to(ROOT / "lutgen").parts[0].removesuffix(".py")
+
+
+def imported(path: Path) -> list[tuple[str, bool]]:
+    """Full names that a file imports, and whether at the top of the module."""
+    tree = ast.parse(path.read_text())
+    found = []
+    for node in ast.walk(tree):
+        top = node in tree.body
+        if isinstance(node, ast.Import):
+            found += [(alias.name, top) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            found += [(f"{node.module}.{alias.name}", top) for alias in node.names]
+    return found
+
+
+def level(name: str) -> int:
+    return next(i for i, names in enumerate(LEVELS) if name in names)
+
+
+def test_imports_point_down():
+    upward = []
+    for path, name in modules():
+        if name in ("__init__", "data"):
+            continue
+        for full, _ in imported(path):
+            parts = full.split(".")
+            if parts[0] == "lutgen" and len(parts) > 1 and parts[1] not in ("data", "kernels", "luts", "load"):
+                target = parts[1]
+                if any(target in names for names in LEVELS) and level(target) < level(name):
+                    upward.append((name, target))
+    assert not upward
+
+
+@pytest.mark.parametrize(("package", "allowed"), HEAVY.items())
+def test_heavy_packages_have_one_room(package, allowed):
+    users = {name for path, name in modules() for full, _ in imported(path) if full.split(".")[0] == package}
+    assert users <= allowed
+
+
+def test_the_numpy_modules_import_neither_opencl_nor_colour():
+    code = (
+        "import sys, lutgen; luts = lutgen.load(); luts.color(.02, .7, .01); luts.profile(.02, .7, .01);"
+        "luts.expand(oxygenation=.5);"
+        "bad = {'pyopencl', 'colour', 'scipy', 'rich', 'PIL', 'matplotlib'} & set(sys.modules);"
+        "sys.exit(str(bad) if bad else 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_swatch_and_bake_do_not_import_colour():
+    code = (
+        "import sys; from lutgen.cli import main; main(['swatch', '--preset', 'light']);"
+        "main(['bake', '--quality', 'draft', '--photons', '2048', '--out', sys.argv[1]]);"
+        "bad = {'colour', 'scipy', 'matplotlib'} & set(sys.modules); sys.exit(str(bad) if bad else 0)"
+    )
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-c", code, f"{folder}/set"], check=True, capture_output=True)
+
+
+def test_modules_stay_short():
+    for path in [*(ROOT / "lutgen").rglob("*.py")]:
+        assert len(path.read_text().splitlines()) <= 300, path.name
+    for path in (ROOT / "kernels").glob("*.cl"):
+        assert len(path.read_text().splitlines()) <= 200, path.name
+
+
+def test_public_functions_have_docstrings():
+    for path, _ in modules():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_"):
+                assert ast.get_docstring(node), f"{path.name}: {node.name}"
+
+
+def test_wheel_holds_one_name_and_its_data(tmp_path):
+    subprocess.run([sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(ROOT)],
+                   check=True, capture_output=True)  # fmt: skip
+    (wheel,) = tmp_path.glob("*.whl")
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"lutgen"}
+    for name in (
+        "kernels/path_table.cl", "luts/bake.toml", "luts/default/manifest.json", "luts/default/paths.exr",
+        "data/quadrature.csv", "data/color_tables.csv", "data/hemoglobin_prahl_1998.csv", "viewer/__init__.py",
+    ):  # fmt: skip
+        assert f"lutgen/{name}" in names
+
+
+def test_no_lock_file_and_no_path_of_a_machine():
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split(
+        "\n"
+    )
+    assert not {Path(name).name for name in listed} & {"uv.lock", "poetry.lock", "package-lock.json", "yarn.lock"}
+    tops = {name.split("/")[0] for name in listed if name}
+    assert {t for t in tops if not t.startswith(".")} <= {
+        "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "lutgen", "kernels", "viewer", "luts", "tests",
+    }  # fmt: skip
