@@ -42,7 +42,7 @@ def bake(options: Namespace) -> Outcome:
         progress("write", None)
         written = time.perf_counter()
         luts.manifest["seconds"] = {"imports": round(imports, 4), **luts.manifest["seconds"]}
-        notes = {"host": platform.node(), "baked_at": time.strftime("%Y-%m-%dT%H:%M:%S%z")}
+        notes = {"host": f"{platform.system()} {platform.machine()}", "baked_at": time.strftime("%Y-%m-%dT%H:%M:%S%z")}
         manifest.save(luts, out, options.force, notes)
     seconds = luts.manifest["seconds"] | {
         "write": round(time.perf_counter() - written, 4), "total": round(seconds_since_start(), 4),

@@ -26,10 +26,10 @@ class Recipe:
     """Everything a bake depends on; `photons` are per wavelength, `skin` sets all but the three LUT axes.
 
     >>> Recipe().photons
-    262144
+    524288
     """
 
-    photons: int = 262_144
+    photons: int = 524_288
     wavelengths: str = "8"
     seed: int = 0
     totals: str = "monte-carlo"

@@ -2,100 +2,28 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from lutgen import color, profiles
 from lutgen.axes import Axis, Grid
 from lutgen.lutset import LutSet
+from lutgen.sheet import GRAY, INK, OVERSAMPLE, PAPER, RULE, Box, Sheet
 from lutgen.tissue import PRESETS, Skin
 
 WIDTH, HEIGHT = 1200, 760
 MARKED = ("very-light", "light", "intermediate", "tan", "brown", "dark")
 CURVES = ("very-light", "intermediate", "dark")
 RADIUS_MM = (0.001, 10.0)
-PAPER, INK, GRAY, RULE = "#ffffff", "#1a1a1a", "#595959", "#dddddd"
 CHANNELS = (("R", "#d1401f", (), 0.3), ("G", "#2f9e44", (9, 4), 0.5), ("B", "#1c3a94", (2.5, 3), 0.7))
 """Per channel: letter, color (lightness 49, 58 and 28), dash and gap in pixels, encircled energy where it is named."""
-
-Box = tuple[float, float, float, float]  # left, top, right, bottom
-_OVERSAMPLE = 2
-
-
-@cache
-def _font(size: float) -> ImageFont.FreeTypeFont:
-    return ImageFont.load_default(size=size)  # type: ignore[return-value]
-
-
-class _Sheet:
-    """White paper to draw on in pixels of the finished picture; drawn larger, then reduced."""
-
-    def __init__(self, width: int, height: int):
-        self.image = Image.new("RGB", (width * _OVERSAMPLE, height * _OVERSAMPLE), PAPER)
-        self.pen = ImageDraw.Draw(self.image)
-
-    def text(self, x: float, y: float, words: str, size=12, fill=INK, anchor="ls", halo: str | None = None) -> None:
-        """Write at an anchor (Pillow's two letters; baseline left)."""
-        at, outline = (x * _OVERSAMPLE, y * _OVERSAMPLE), 3 * _OVERSAMPLE if halo else 0
-        self.pen.text(at, words, fill, _font(size * _OVERSAMPLE), anchor, stroke_width=outline, stroke_fill=halo)
-
-    def measure(self, words: str, size: float) -> float:
-        return _font(size * _OVERSAMPLE).getlength(words) / _OVERSAMPLE
-
-    def upright(self, x: float, y: float, words: str, size=12, fill=GRAY) -> None:
-        """Write upward, centered on (x, y)."""
-        along, across = round(self.measure(words, size) + 4), round(size * 1.6)
-        label = _Sheet(along, across)
-        label.text(along / 2, across / 2, words, size, fill, "mm")
-        corner = round((x - across / 2) * _OVERSAMPLE), round((y - along / 2) * _OVERSAMPLE)
-        self.image.paste(label.image.transpose(Image.Transpose.ROTATE_90), corner)
-
-    def line(self, points, fill=INK, width=1.0, dash: tuple = ()) -> None:
-        """Draw through points [P, 2]; `dash` is (on, off) in pixels."""
-        points = np.asarray(points, float) * _OVERSAMPLE
-        pieces = points[None]
-        if dash:
-            along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-            starts = np.arange(0, along[-1], sum(dash) * _OVERSAMPLE)
-            at = np.linspace(starts, np.minimum(starts + dash[0] * _OVERSAMPLE, along[-1]), 4, axis=1)
-            pieces = np.stack([np.interp(at, along, values) for values in points.T], axis=-1)
-        for piece in pieces:
-            self.pen.line([tuple(p) for p in piece], fill, round(width * _OVERSAMPLE), joint="curve")
-
-    def box(self, box: Box, fill: str | None = None, outline: str | None = None) -> None:
-        """Draw a rectangle; its outline lies outside, so what it frames stays whole."""
-        left, top, right, bottom = (round(v * _OVERSAMPLE) for v in box)
-        if fill:
-            self.pen.rectangle((left, top, right - 1, bottom - 1), fill)
-        if outline:
-            grown = left - _OVERSAMPLE, top - _OVERSAMPLE, right + _OVERSAMPLE - 1, bottom + _OVERSAMPLE - 1
-            self.pen.rectangle(grown, outline=outline, width=_OVERSAMPLE)
-
-    def frame(self, box: Box, x_ticks, y_ticks, x_label: str, y_label: str = "", grid: bool = False) -> None:
-        """Outline a plot; ticks are (fraction of the side, label), the y label stands left of the y ticks' labels."""
-        left, top, right, bottom = box
-        for at, words in x_ticks:
-            x = left + at * (right - left)
-            self.line([(x, top if grid else bottom), (x, bottom + 4)], RULE if grid else GRAY)
-            self.text(x, bottom + 15, words, 11, anchor="ms")
-        for at, words in y_ticks:
-            y = bottom - at * (bottom - top)
-            self.line([(left - 4, y), (right if grid else left - 1, y)], RULE if grid else GRAY)
-            self.text(left - 7, y, words, 11, anchor="rm")
-        self.box(box, outline=GRAY)
-        self.text((left + right) / 2, bottom + 32, x_label, 12, GRAY, "ms")
-        if y_label:
-            widest = max(self.measure(words, 11) for _, words in y_ticks)
-            self.upright(left - widest - 20, (top + bottom) / 2, y_label)
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
-def _ticks(sheet: _Sheet, axis: Axis, length: float, upright: bool) -> list[tuple[float, str]]:
+def _ticks(sheet: Sheet, axis: Axis, length: float, upright: bool) -> list[tuple[float, str]]:
     """Round values of a chromophore axis at their texture coordinates: its ends first, then what fits between."""
     wanted = [axis.low, axis.high, *(m * 10.0**d for m in (1, 5, 2, 3, 4, 6, 8) for d in range(0, -5, -1))]
     kept: list[tuple[float, str]] = []
@@ -128,17 +56,17 @@ def draw(luts: LutSet) -> Image.Image:
 
     RGB, 1200 x 760 pixels. Colors are display sRGB; each cell of the chart is one stored node.
     """
-    sheet = _Sheet(WIDTH, HEIGHT)
+    sheet = Sheet(WIDTH, HEIGHT)
     _header(sheet, luts)
     _color_chart(sheet, luts)
     sheet.text(24, 456, "Light that leaves within a radius of where it entered", 16)
     sheet.text(WIDTH - 24, 456, "share of each channel's total, linear ACEScg", 12, GRAY, "rs")
     for i, name in enumerate(CURVES):
         _profile_chart(sheet, luts, name, _column(i, 3, 522, 706), first=i == 0)
-    return sheet.image.reduce(_OVERSAMPLE)
+    return sheet.image.reduce(OVERSAMPLE)
 
 
-def _header(sheet: _Sheet, luts: LutSet) -> None:
+def _header(sheet: Sheet, luts: LutSet) -> None:
     facts, skin = luts.manifest, luts.manifest["recipe"]["skin"]
     sheet.text(24, 40, f"Skin lookup tables, lutgen {facts['lutgen']}", 22)
     made = [
@@ -164,7 +92,7 @@ def _display(luts: LutSet, acescg: np.ndarray) -> np.ndarray:
     return np.rint(255 * color.encode_srgb(color.from_acescg(acescg, "srgb", luts.pipeline))).astype(np.uint8)
 
 
-def _color_chart(sheet: _Sheet, luts: LutSet) -> None:
+def _color_chart(sheet: Sheet, luts: LutSet) -> None:
     grid = luts.color_lut.grid
     marked = {n: PRESETS[n] for n in MARKED if _inside(grid, PRESETS[n])}
     sheet.text(24, 104, "Color of skin lit along its normal", 16)
@@ -178,8 +106,8 @@ def _color_chart(sheet: _Sheet, luts: LutSet) -> None:
         row = ((np.arange(bottom - top) + 0.5) * grid.hemoglobin.count / (bottom - top)).astype(int)
         column = ((np.arange(right - left) + 0.5) * grid.melanin.count / (right - left)).astype(int)
         cells = _display(luts, luts.color_lut.acescg[:, e])[row[::-1, None], column]
-        tile = Image.fromarray(cells.repeat(_OVERSAMPLE, axis=0).repeat(_OVERSAMPLE, axis=1))
-        sheet.image.paste(tile, (left * _OVERSAMPLE, top * _OVERSAMPLE))
+        tile = Image.fromarray(cells.repeat(OVERSAMPLE, axis=0).repeat(OVERSAMPLE, axis=1))
+        sheet.image.paste(tile, (left * OVERSAMPLE, top * OVERSAMPLE))
         x_ticks = _ticks(sheet, grid.melanin, right - left, upright=False)
         y_ticks = [] if i else _ticks(sheet, grid.hemoglobin, bottom - top, upright=True)
         labels = "melanin (melanosomes in epidermis)", "" if i else "hemoglobin (blood in dermis)"
@@ -197,7 +125,7 @@ def _inside(grid: Grid, skin: Skin) -> bool:
     return _clamped(grid, skin) == (skin.melanin, skin.eumelanin, skin.hemoglobin)
 
 
-def _mark(sheet: _Sheet, grid: Grid, box: Box, skins: dict[str, Skin]) -> None:
+def _mark(sheet: Sheet, grid: Grid, box: Box, skins: dict[str, Skin]) -> None:
     """Circle skins in a tile and name each at the end of a leader, wherever nothing else stands."""
     left, top, right, bottom = box
     x_of = {n: left + float(grid.melanin.coordinate(s.melanin)) * (right - left) for n, s in skins.items()}
@@ -217,19 +145,19 @@ def _mark(sheet: _Sheet, grid: Grid, box: Box, skins: dict[str, Skin]) -> None:
                 sheet.box(leader, INK, outline=PAPER)
                 break
     for name, label in labels.items():
-        sheet.pen.rounded_rectangle([v * _OVERSAMPLE for v in label], 3 * _OVERSAMPLE, PAPER, INK, 1)
+        sheet.pen.rounded_rectangle([v * OVERSAMPLE for v in label], 3 * OVERSAMPLE, PAPER, INK, 1)
         sheet.text(label[0] + 4, (label[1] + label[3]) / 2, name, 11, anchor="lm")
     for name in skins:
         for r, ink, width in ((5.5, INK, 3), (4.5, PAPER, 1.5)):
             at = (x_of[name] - r, y_of[name] - r, x_of[name] + r, y_of[name] + r)
-            sheet.pen.ellipse([v * _OVERSAMPLE for v in at], outline=ink, width=round(width * _OVERSAMPLE))
+            sheet.pen.ellipse([v * OVERSAMPLE for v in at], outline=ink, width=round(width * OVERSAMPLE))
 
 
 def _overlap(one: Box, other: Box) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
-def _profile_chart(sheet: _Sheet, luts: LutSet, name: str, box: Box, first: bool) -> None:
+def _profile_chart(sheet: Sheet, luts: LutSet, name: str, box: Box, first: bool) -> None:
     """Encircled energy of a preset, clamped to the profile LUT's axes, against radius, per ACEScg channel."""
     lut = luts.profile_lut
     skin = _clamped(lut.grid, PRESETS[name])
@@ -263,7 +191,7 @@ def draw_swatch(skin: Skin, result: dict) -> Image.Image:
 
     `result` is what `lutgen swatch --json` prints; the band around the spectrum is two standard errors each way.
     """
-    sheet = _Sheet(800, 400)
+    sheet = Sheet(800, 400)
     linear = np.asarray(result["linear_srgb"], float)
     shown = np.rint(255 * color.encode_srgb(linear)).astype(np.uint8)
     sheet.box((24, 24, 244, 184), "#" + bytes(shown).hex(), GRAY)
@@ -294,6 +222,6 @@ def draw_swatch(skin: Skin, result: dict) -> Image.Image:
     if sigma.any():
         sheet.text(right, top - 10, "band: two standard errors each way", 11, GRAY, "rs")
         outline = np.column_stack([np.concatenate([x, x[::-1]]), np.concatenate([low, high[::-1]])])
-        sheet.pen.polygon([tuple(p) for p in outline * _OVERSAMPLE], "#c9c9c9")
+        sheet.pen.polygon([tuple(p) for p in outline * OVERSAMPLE], "#c9c9c9")
     sheet.line(np.column_stack([x, mean]), INK, 1.5)
-    return sheet.image.reduce(_OVERSAMPLE)
+    return sheet.image.reduce(OVERSAMPLE)

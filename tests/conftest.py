@@ -1,15 +1,17 @@
 """Shared sets, baked once per run."""
 
+from dataclasses import replace
+
 import pytest
 
 import lutgen
-from lutgen import manifest
+from lutgen import config, manifest
 
 
 @pytest.fixture(scope="session")
 def draft():
-    """A small set with the default recipe's axes."""
-    return lutgen.bake({"photons": 16_384, "seed": 5})
+    """A set of draft quality."""
+    return lutgen.bake(replace(config.quality("draft"), seed=5))
 
 
 @pytest.fixture(scope="session")

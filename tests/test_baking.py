@@ -41,7 +41,7 @@ def test_color_nodes_are_exact_within_sigma(draft):
 
 
 def test_anchored_totals_are_exact_and_keep_the_shape(draft):
-    anchored = lutgen.bake({"photons": 16_384, "seed": 5, "totals": "anchored"})
+    anchored = lutgen.bake({"photons": 65_536, "seed": 5, "totals": "anchored"})
     m, e, h = (v.ravel() for v in anchored.color_lut.grid.nodes())
     nm = anchored.paths.wavelength_nm
     exact = totals.exact_totals(SKIN)(nm, *expansion.coefficients(nm, anchored.absorbers, m, e, h)).T @ draft.weights
@@ -65,7 +65,7 @@ def test_profiles_between_nodes_meet_a_converged_trace():
 
 def test_expansion_is_a_bake_at_that_oxygenation(draft):
     """Other seed, so independent: color within 4.5 sigma of both, profiles too."""
-    baked = lutgen.bake({"photons": 16_384, "seed": 6, "skin": {"oxygenation": 0.3}})
+    baked = lutgen.bake({"photons": 65_536, "seed": 6, "skin": {"oxygenation": 0.3}})
     expanded = draft.expand(oxygenation=0.3)
     skins = [v.ravel()[::7] for v in draft.color_lut.grid.nodes()]
     sigma = np.hypot(baked.color_std_error(*skins), expanded.color_std_error(*skins))

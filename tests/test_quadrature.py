@@ -25,7 +25,7 @@ SETTINGS = {
     "saidi": replace(SKIN, scattering="saidi"),
 }
 SETTING_BOUND = {"6": 0.65, "8": 0.28, "12": 0.05}
-"""Largest color error of any setting; measured over 4,000 skins each: .61, .26, .044."""
+"""Largest color error of any setting; measured over 4,000 skins each: .60, .27, .036."""
 both_pipelines = pytest.mark.parametrize("pipeline", color.PIPELINES)
 
 
@@ -98,11 +98,10 @@ def test_color_error_at_other_settings(setting, pipeline):
 
 
 @both_pipelines
-@pytest.mark.parametrize(("name", "bound"), [("6", 0.1), ("8", 0.05), ("12", 0.02)])
+@pytest.mark.parametrize(("name", "bound"), [("6", 0.1), ("8", 0.02), ("12", 0.003)])
 def test_perfect_white_is_the_d65_white(name, bound, pipeline):
-    """The weights' sum against the 5 nm one, CIEDE2000."""
+    """The weights' sum against the 5 nm one, CIEDE2000; measured .084, .0155, .0019."""
     white = [quadrature.load(rule, pipeline).xyz_weights.sum(axis=0) for rule in (name, "5nm")]
-    print(name, pipeline, color.delta_e00(*map(color.lab, white)))
     assert color.delta_e00(*map(color.lab, white)) <= bound
 
 
@@ -116,7 +115,6 @@ def test_profile_error_is_the_stored_one(monkeypatch):
             rule = quadrature.load(name, pipeline)
             energy = rings[:, :, make_quadrature.at(rule.wavelength_nm)] @ rule.xyz_weights
             most = make_quadrature.energy_difference(energy, reference).max()
-            print(name, pipeline, most, rule.profile_error)
             assert 0.5 * rule.profile_error[1] <= most <= 1.5 * rule.profile_error[1]
 
 

@@ -14,7 +14,7 @@ LEVELS = [
     {"commands", "benchmark", "checking"},
     {"baking"},
     {"solvers"},
-    {"manifest", "preview", "device", "exr", "lutset", "expansion"},
+    {"manifest", "preview", "sheet", "device", "exr", "lutset", "expansion"},
     {"config", "paths", "profiles", "quadrature"},
     {"axes", "tissue", "color"},
     {"chromophores"},

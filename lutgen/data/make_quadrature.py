@@ -101,6 +101,7 @@ def color_metric(xyz: np.ndarray) -> np.ndarray:
     scale = np.maximum(xyz, 1e-3)
 
     def squared(direction: np.ndarray) -> np.ndarray:
+        """Squared difference [S] per squared relative step."""
         ends = (color.lab(xyz + sign * step * direction * scale) for sign in (1, -1))
         return (color.delta_e00(*ends) / (2 * step)) ** 2
 
@@ -194,6 +195,7 @@ def exchange(equations: list, chosen: list[int], rng: np.random.Generator) -> tu
     """Move one wavelength at a time to its best place until none moves; the sum of squares and the lattice points."""
 
     def left(points: list[int]) -> float:
+        """Sum of squares of both pipelines."""
         return sum(solve(pipeline, points)[1] for pipeline in equations)
 
     best, moved = left(chosen), True
@@ -247,7 +249,7 @@ def lines(
     """
     yield "# Wavelengths and non-negative XYZ weights under D65 that stand for a spectrum of skin every 5 nm."
     yield "# By lutgen.data.make_quadrature. Errors against the 5 nm sum, p95 and max: CIEDE2000 of random skins per"
-    yield f"# setting ({HELD_OUT} each), largest difference of encircled energy beyond .01 mm ({HELD_OUT_PROFILES} skins)."
+    yield f"# setting ({HELD_OUT} each), difference of encircled energy ({HELD_OUT_PROFILES} skins, beyond .01 mm)."
     regular = {f"{step}nm": {p: color.xyz_weights(step, p) for p in color.PIPELINES} for step in (10, 5)}
     few = {name: {p: (nm, w) for p, w in weights.items()} for name, (nm, weights) in chosen.items()}
     for name, rule in (few | regular).items():
