@@ -6,6 +6,7 @@ import os
 import sys
 import tempfile
 import warnings
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -119,13 +120,15 @@ def source(*names: str) -> str:
     return "\n".join((files("lutgen.kernels") / f"{name}.cl").read_text() for name in names)
 
 
-def struct_source(device: Device, structs: dict[str, np.dtype]) -> str:
+@cache
+def struct_source(device: Device, structs: tuple[tuple[str, np.dtype], ...]) -> str:
     """C declarations of the host's record types; raises where the device lays them out differently."""
     from pyopencl.tools import match_dtype_to_c_struct
 
     declarations = []
-    for name, dtype in structs.items():
-        matched, declaration = match_dtype_to_c_struct(device.context.devices[0], name, dtype)  # type: ignore[attr-defined]
+    for name, dtype in structs:
+        with _quiet():
+            matched, declaration = match_dtype_to_c_struct(device.context.devices[0], name, dtype)  # type: ignore[attr-defined]
         if matched != dtype:
             raise MachineError(f"device {device.name}: struct {name} has another layout there; choose another device")
         declarations.append(declaration)
@@ -136,13 +139,20 @@ def struct_source(device: Device, structs: dict[str, np.dtype]) -> str:
 def _build(device: Device, text: str, constants: tuple[tuple[str, int], ...]):
     cl = _opencl()
     options = [*_BUILD_OPTIONS, *(f"-D{key}={value}" for key, value in constants)]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # compilers' remarks are no news to a user
-        try:
+    try:
+        with _quiet():
             return cl.Program(device.context, text).build(options)
-        except cl.Error as error:
-            line = next((line for line in str(error).splitlines() if "error" in line.lower()), str(error))
-            raise MachineError(f"device {device.name}: kernel does not build: {line.strip()}") from error
+    except cl.Error as error:
+        line = next((line for line in str(error).splitlines() if "error" in line.lower()), str(error))
+        raise MachineError(f"device {device.name}: kernel does not build: {line.strip()}") from error
+
+
+@contextmanager
+def _quiet():
+    """Compilers' remarks are no news to a user."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 @cache
