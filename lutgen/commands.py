@@ -154,9 +154,14 @@ def info(options: Namespace) -> Outcome:
     lines.append(f"skin: {', '.join(f'{key} {value}' for key, value in facts['recipe']['skin'].items())}")
     lines.append(f"wavelengths: {nm} nm; {facts['trace']['photons_per_wavelength']} photons each, "
                  f"seed {facts['trace']['seed']}, on {facts['trace']['device']}")  # fmt: skip
-    found = facts["error"]["color"]
-    lines.append(f"color: ΔE00 max {found['delta_e00_max']:.3f}, p95 {found['delta_e00_p95']:.3f} against "
-                 f"{found['compared_with']}")  # fmt: skip
+    if facts["error"]:
+        found = facts["error"]["color"]
+        lines.append(
+            f"color: ΔE00 max {found['delta_e00_max']:.3f}, p95 {found['delta_e00_p95']:.3f} "
+            f"against {found['compared_with']}"
+        )
+    else:
+        lines.append("color: expanded from stored paths, its error not measured")
     sizes = {name: (folder / name).stat().st_size for name in manifest.FILES}
     lines += [f"{name}: {size / 1000:.0f} kB" for name, size in sizes.items()]
     return facts | {"bytes": sizes}, "\n".join(lines), 0

@@ -4,11 +4,23 @@ import operator
 
 
 class InputError(ValueError):
-    """A parameter, file or option is wrong; the message names it, its value, what is allowed and what to do."""
+    """A parameter, file or option is wrong; the message names it, its value, what is allowed and what to do.
+
+    >>> import lutgen
+    >>> lutgen.preset("pale")
+    Traceback (most recent call last):
+    ...
+    lutgen.errors.InputError: preset = 'pale': allowed is very-light, light, intermediate, tan, brown, dark, ...
+    """
 
 
 class MachineError(RuntimeError):
-    """The machine lacks something (OpenCL, disk space); the message names it and says what to install or free."""
+    """The machine lacks something (OpenCL, disk space); the message names it and says what to install or free.
+
+    >>> import lutgen
+    >>> issubclass(lutgen.MachineError, RuntimeError)
+    True
+    """
 
 
 def in_range(name: str, value: object, low: float, high: float, unit: str = "") -> float:

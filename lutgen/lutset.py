@@ -41,7 +41,12 @@ class ProfileLut:
 
 @dataclass(frozen=True)
 class LutSet:
-    """Color LUT, profile LUT, the path table both come from, and the manifest that says what they mean."""
+    """Color LUT, profile LUT, the path table both come from, and the manifest that says what they mean.
+
+    >>> import lutgen
+    >>> lutgen.load().oxygenation
+    0.7
+    """
 
     color_lut: ColorLut
     profile_lut: ProfileLut
@@ -146,7 +151,10 @@ class LutSet:
         recipe = dict(self.manifest["recipe"])
         recipe["skin"] = dict(recipe["skin"], oxygenation=oxygenation)
         extra = {name: getattr(absorb, name).tolist() for name in ("epidermis", "dermis")}
-        manifest = dict(self.manifest, recipe=recipe, extra_absorbers_per_mm=extra, error=None, files={})
+        manifest = self.manifest | {
+            "recipe": recipe, "extra_absorbers_per_mm": extra, "largest_clamped_share": float(clamped.max()),
+            "error": None, "files": {},
+        }  # fmt: skip
         return replace(
             self,
             color_lut=ColorLut(self.color_lut.grid, cells),

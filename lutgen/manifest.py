@@ -91,6 +91,12 @@ def save(luts: LutSet, out: str | Path, force: bool = False, notes: dict | None 
 
     Files go to a sibling folder, are synced, and the folder is renamed. With `force` an old set is first moved
     aside, then deleted. Raises InputError where `out` exists or cannot be written, MachineError on a full disk.
+
+    >>> import lutgen, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     out = lutgen.save(lutgen.load().expand(oxygenation=0.4), f"{folder}/pale")
+    ...     lutgen.load(out).oxygenation
+    0.4
     """
     out = Path(out)
     check_target(out, force)

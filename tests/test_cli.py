@@ -48,6 +48,15 @@ def test_bake_info_check(capsys, tmp_path):
     assert json.loads(text)["passed"]
 
 
+def test_an_expanded_set_can_be_saved_shown_and_checked(capsys, draft, tmp_path):
+    out = manifest.save(draft.expand(oxygenation=0.4, extra_absorbers={"dermis": 0.01}), tmp_path / "pale")
+    status, text, _ = run(capsys, "info", out)
+    assert status == 0
+    assert "oxygenation 0.4" in text
+    status, text, _ = run(capsys, "check", out)
+    assert status == 0, text
+
+
 def test_bake_json_is_one_object(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "lutgen.cli", "bake", "--quality", "draft", "--json", "--out", str(tmp_path / "x")],

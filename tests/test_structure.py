@@ -1,12 +1,15 @@
 """The layout: imports point down, the wheel's only top-level name is lutgen, no heavy import on a light path."""
 
 import ast
+import shutil
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+
+import lutgen
 
 ROOT = Path(__file__).parent.parent
 LEVELS = [
@@ -75,16 +78,13 @@ def test_the_numpy_modules_import_neither_opencl_nor_colour():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_swatch_and_bake_do_not_import_colour():
+def test_swatch_and_bake_do_not_import_colour(tmp_path):
     code = (
         "import sys; from lutgen.cli import main; main(['swatch', '--preset', 'light']);"
         "main(['bake', '--quality', 'draft', '--photons', '2048', '--out', sys.argv[1]]);"
         "bad = {'colour', 'scipy', 'matplotlib'} & set(sys.modules); sys.exit(str(bad) if bad else 0)"
     )
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([sys.executable, "-c", code, f"{folder}/set"], check=True, capture_output=True)
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "set")], check=True, capture_output=True)
 
 
 def test_modules_stay_short():
@@ -101,9 +101,18 @@ def test_public_functions_have_docstrings():
                 assert ast.get_docstring(node), f"{path.name}: {node.name}"
 
 
+def test_every_public_name_shows_an_example():
+    shown = [getattr(lutgen, name) for name in lutgen.__all__ if callable(getattr(lutgen, name))]
+    methods = [value for name, value in vars(lutgen.LutSet).items() if callable(value) and not name.startswith("_")]
+    for thing in (*shown, *methods):
+        assert ">>>" in (thing.__doc__ or ""), thing.__name__
+
+
 def test_wheel_holds_one_name_and_its_data(tmp_path):
-    subprocess.run([sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(ROOT)],
-                   check=True, capture_output=True)  # fmt: skip
+    clean = tmp_path / "source"  # a build leaves files in its source, which the next one would pack
+    shutil.copytree(ROOT, clean, ignore=shutil.ignore_patterns(".*", "build", "*.egg-info", "__pycache__"))
+    command = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(clean)]
+    subprocess.run(command, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"lutgen"}
