@@ -10,7 +10,7 @@ from lutgen.errors import InputError, one_of
 from lutgen.profiles import Profile, default_edges
 from lutgen.tissue import Layer, Skin, layers
 
-METHODS = {"path-table": "path_table", "adding-doubling": "adding_doubling"}
+METHODS = {"path-table": "path_table", "adding-doubling": "adding_doubling", "direct": "direct"}
 """Method name -> module of this package with `reflectance` and, where the method knows radii, `profile`."""
 
 
