@@ -14,6 +14,15 @@
     vf name = (outside);                                                                 \
     for (int k = 0; k < LAYERS; k++) name = SELECT(name, (vf)(layers[k].field), MASK((index) == k));
 
+// hg_cosine for a g of its own in each lane; half_inverse_g is 1 / (2 g), or 0 where g is small.
+inline vf hg_cosine_lanes(vf g, vf half_inverse_g, vf random) {
+    vf s = random * SIGNED_UNIT, sum = fma(g, g, (vf)(1.0f)), w = 1.0f / fma(g, s, (vf)(1.0f));
+    vf t = (1.0f - g * g) * w, large = (sum - t * t) * half_inverse_g;
+    vf small = fma(s * sum, fma(0.5f * g, s, (vf)(1.0f)), 0.5f * g * (3.0f - g * g)) * w * w;
+    vf cosine = SELECT(large, small, MASK(half_inverse_g == 0.0f));
+    return LESSER(GREATER(cosine, (vf)(-1.0f)), (vf)(1.0f));
+}
+
 __kernel void direct(__global const job_t *jobs, __constant layer_t *layers, __global float *bank,
                      __global result_t *results) {
     const uint id = get_global_id(0);

@@ -94,7 +94,7 @@ inline vf exp_lanes(vf x) {
     p = fma(p, f, (vf)(0.0555071328f));
     p = fma(p, f, (vf)(0.240221197f));
     p = fma(p, f, (vf)(0.693146967f));
-    p = fma(p, f, (vf)(1.00000007f));
+    p = fma(p, f, (vf)(1.0f));  // exactly 1 at 0: no weight may grow
     return SELECT(AS_VF(AS_VI(p) + (e << 23)), (vf)(0.0f), MASK(x < -87.0f));
 }
 

@@ -35,15 +35,6 @@ inline vf hg_cosine(hg_t h, vf random, vf inverse_denominator) {
     return LESSER(GREATER(cosine, (vf)(-1.0f)), (vf)(1.0f));
 }
 
-// The same for a g of its own in each lane; half_inverse_g is 1 / (2 g), or 0 where g is small.
-inline vf hg_cosine_lanes(vf g, vf half_inverse_g, vf random) {
-    vf s = random * SIGNED_UNIT, sum = fma(g, g, (vf)(1.0f)), w = 1.0f / fma(g, s, (vf)(1.0f));
-    vf t = (1.0f - g * g) * w, large = (sum - t * t) * half_inverse_g;
-    vf small = fma(s * sum, fma(0.5f * g, s, (vf)(1.0f)), 0.5f * g * (3.0f - g * g)) * w * w;
-    vf cosine = SELECT(large, small, MASK(half_inverse_g == 0.0f));
-    return LESSER(GREATER(cosine, (vf)(-1.0f)), (vf)(1.0f));
-}
-
 // Turn a unit direction by an angle of cosine c; (p, q) is the sine times the direction of a uniform azimuth. The
 // frame is that of Duff et al. 2017, finite for uz = +1 and -1 without a branch, multiplied out; its signs are left to
 // the azimuth, which is uniform either way. inverse = 1 / (1 + |uz|).

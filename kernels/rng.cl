@@ -20,7 +20,8 @@ inline vu next_bits(rng_t *s) {
 }
 
 // Uniform in (0, 1): the centers of 2^23 cells, so that log(0) cannot occur.
-inline vf next_uniform(rng_t *s) { return AS_VF((next_bits(s) >> 9) | 0x3f800000u) - 0.99999994f; }
+inline vf uniform_of(vu random) { return AS_VF((random >> 9) | 0x3f800000u) - 0.99999994f; }
+inline vf next_uniform(rng_t *s) { return uniform_of(next_bits(s)); }
 
 // Uniform in [-1, 1] before its scale of 2^-31, which the caller folds into a constant.
 inline vf next_signed(rng_t *s) { return TO_VF(AS_VI(next_bits(s))); }

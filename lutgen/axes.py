@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lutgen import chromophores
-from lutgen.errors import InputError, in_range
+from lutgen.errors import InputError, in_range, shown, whole
 
 ALLOWED = {"melanin": chromophores.MELANIN, "eumelanin": chromophores.EUMELANIN, "hemoglobin": chromophores.HEMOGLOBIN}
 MAX_COUNT = 256
@@ -34,11 +34,10 @@ class Axis:
     spacing: str = "linear"
 
     def __post_init__(self):
-        if isinstance(self.count, bool) or not isinstance(self.count, int) or not 1 <= self.count <= MAX_COUNT:
-            raise InputError(f"{self.name} axis: count = {self.count!r}: allowed is a whole number 1 to {MAX_COUNT}")
-        low, high = ALLOWED.get(self.name, (-np.inf, np.inf))
-        in_range(f"{self.name} axis: low", self.low, low, high)
-        in_range(f"{self.name} axis: high", self.high, low, high)
+        low, high = ALLOWED.get(self.name, (-1e300, 1e300))
+        object.__setattr__(self, "count", whole(f"{self.name} axis: count", self.count, 1, MAX_COUNT))
+        object.__setattr__(self, "low", in_range(f"{self.name} axis: low", self.low, low, high))
+        object.__setattr__(self, "high", in_range(f"{self.name} axis: high", self.high, low, high))
         if self.low > self.high:
             raise InputError(f"{self.name} axis: low = {self.low:g} is above high = {self.high:g}; swap them")
         if (self.count == 1) != (self.low == self.high):
@@ -55,7 +54,7 @@ class Axis:
     def exponent(self) -> float:
         """The power under which nodes are even: 1 for linear, 1/3 for cbrt, p for power:p, 0 for log."""
         named = {"linear": 1.0, "cbrt": 1 / 3, "log": 0.0}
-        if self.spacing in named:
+        if isinstance(self.spacing, str) and self.spacing in named:
             return named[self.spacing]
         kind, _, power = str(self.spacing).partition(":")
         try:
@@ -63,9 +62,8 @@ class Axis:
         except ValueError:
             value = np.nan
         if kind != "power" or not 0 < value <= 1:
-            raise InputError(
-                f"{self.name} axis: spacing = {self.spacing!r}: allowed is linear, cbrt, log, power:p with 0 < p <= 1"
-            )
+            allowed = "linear, cbrt, log, power:p with 0 < p <= 1"
+            raise InputError(f"{self.name} axis: spacing = {shown(self.spacing)}: allowed is {allowed}")
         return value
 
     def _warp(self, x):
@@ -110,6 +108,11 @@ class Grid:
     melanin: Axis
     eumelanin: Axis
     hemoglobin: Axis
+
+    def __post_init__(self):
+        for name in ("melanin", "eumelanin", "hemoglobin"):
+            if getattr(self, name).name != name:
+                raise InputError(f"{name} = the {getattr(self, name).name} axis: a grid takes each axis by its name")
 
     @property
     def shape(self) -> tuple[int, int, int]:

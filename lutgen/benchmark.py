@@ -15,6 +15,7 @@ import numpy as np
 import lutgen
 from lutgen import device as ocl
 from lutgen.baking import skin_medium
+from lutgen.errors import MachineError
 from lutgen.solvers import path_table
 from lutgen.tissue import preset
 
@@ -36,7 +37,7 @@ def trace(chosen: ocl.Device) -> dict:
     """Rate of the walk with drawn lives: W lanes and one lane of the same source in turn, medians and their ratio."""
     widths = {"lanes": chosen, "one lane": replace(chosen, lanes=1)}
     for device in widths.values():
-        _rate(device, path_table.BLOCK_PHOTONS)  # build
+        _rate(device, path_table.BLOCK_PHOTONS["cpu"])  # build
     rates = {name: [] for name in widths}
     peaks = []
     for _ in range(ROUNDS):
@@ -77,7 +78,9 @@ def bakes(device: str | None) -> dict:
         for quality in ("draft", "draft", "standard", "reference"):  # the first one warms the kernel cache
             out = Path(folder) / f"{quality}-{len(list(Path(folder).iterdir()))}"
             command = [sys.executable, "-m", "lutgen.cli", "bake", "--quality", quality, "--out", str(out), "--json"]
-            done = subprocess.run(command + (["--device", device] if device else []), capture_output=True, check=True)
+            done = subprocess.run(command + (["--device", device] if device else []), capture_output=True, text=True)
+            if done.returncode:
+                raise MachineError(f"bake of quality {quality} failed: {done.stderr.strip().removeprefix('lutgen: ')}")
             result = json.loads(done.stdout)
             results[quality] = {"seconds": result["seconds"], "error": result["error"]}
     return results

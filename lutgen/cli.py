@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
+import os
 import sys
-from pathlib import Path
 
 from lutgen import errors
 
@@ -43,8 +44,8 @@ def _parser() -> argparse.ArgumentParser:
     swatch.add_argument("--saidi-b-nm4-per-mm", type=float, help="Saidi's fitted B (default: 8.4e10)")
     swatch.add_argument("--reading", help="reduced, similarity or literal")
     swatch.add_argument("--pipeline", default="default", help="default or source")
-    swatch.add_argument("--method", default="adding-doubling", help="adding-doubling or path-table")
-    swatch.add_argument("--photons", type=int, default=100_000, help="per wavelength, for path-table")
+    swatch.add_argument("--method", default="adding-doubling", help="adding-doubling, path-table or direct")
+    swatch.add_argument("--photons", type=int, default=100_000, help="per wavelength, for Monte Carlo")
     swatch.add_argument("--seed", type=int, default=0)
     swatch.add_argument("--png", metavar="FILE", help="write a picture of the color")
     swatch.set_defaults(run="lutgen.commands.swatch")
@@ -70,25 +71,31 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _fail(message: str, status: int) -> int:
+    print(f"lutgen: {' '.join(message.split())}", file=sys.stderr)
+    return status
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit status: 0, 2 for bad input, 1 where the machine fails."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that cannot show a sign must not fail a bake
     try:
         options = _parser().parse_args(arguments)
         module, _, function = options.run.rpartition(".")
         from importlib import import_module
 
         result, text, status = getattr(import_module(module), function)(options)
-        print(json.dumps(result) if options.json else text)
+        print(json.dumps(result) if options.json else text, flush=True)
         return status
     except errors.InputError as error:
-        print(f"lutgen: {error}", file=sys.stderr)
-        return 2
-    except (errors.MachineError, MemoryError) as error:
-        print(f"lutgen: {error or 'out of memory'}", file=sys.stderr)
-        return 1
+        return _fail(str(error), 2)
     except BrokenPipeError:
-        sys.stdout = open(Path("/dev/null"), "w")  # noqa: SIM115 - the reader left; say nothing at exit either
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - the reader left; say nothing at exit either
         return 1
+    except (errors.MachineError, MemoryError, OSError) as error:
+        return _fail(str(error) or "out of memory", 1)
     except KeyboardInterrupt:
         print("lutgen: interrupted; nothing was written", file=sys.stderr)
         return 130

@@ -10,7 +10,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from lutgen import color, config, manifest
-from lutgen.errors import InputError
+from lutgen.errors import InputError, MachineError, cannot_write
 
 Outcome = tuple[dict, str, int]
 
@@ -35,8 +35,7 @@ def bake(options: Namespace) -> Outcome:
     recipe = config.load(options.recipe, base) if options.recipe else base
     changes = {key: getattr(options, key) for key in ("photons", "wavelengths", "seed")}
     recipe = replace(recipe, **{key: value for key, value in changes.items() if value is not None})
-    out = Path(options.out)
-    manifest.check_target(out, options.force)
+    out = manifest.check_target(options.out, options.force)
     with _Progress(quiet=options.json) as progress:
         luts = baking.bake(recipe, device=options.device, progress=progress)
         progress("write", None)
@@ -100,6 +99,7 @@ class _Progress:
 
 def swatch(options: Namespace) -> Outcome:
     """`lutgen swatch`: one skin's spectrum and color."""
+    from lutgen import device as ocl
     from lutgen import solvers
     from lutgen.tissue import Skin, preset
 
@@ -108,12 +108,16 @@ def swatch(options: Namespace) -> Outcome:
     given = {name: getattr(options, name) for name in fields if getattr(options, name) is not None}
     if options.preset is None and "melanin" not in given:
         raise InputError("swatch: --preset or --melanin is needed; for example `lutgen swatch --preset light`")
-    base = preset(options.preset) if options.preset else Skin(0.0195, 0.7, 0.0088)
+    base = preset(options.preset) if options.preset is not None else Skin(0.0195, 0.7, 0.0088)
     skin = replace(base, **given)
-    extra = {"photons": options.photons, "seed": options.seed, "device": options.device}
-    reflectance, sigma = solvers.spectrum_with_error(
-        skin, None, options.method, **(extra if options.method == "path-table" else {})
-    )
+    if skin.scattering != "saidi" and {"saidi_a_per_mm", "saidi_b_nm4_per_mm"} & set(given):
+        raise InputError(f"saidi_*: scattering is {skin.scattering}, which has no such values; add --scattering saidi")
+    extra: dict = {"photons": options.photons, "seed": options.seed}
+    if options.device is not None:
+        ocl.choose(options.device)
+    if options.method in ("path-table", "direct"):
+        extra["device"] = options.device
+    reflectance, sigma = solvers.spectrum_with_error(skin, None, options.method, **extra)
     xyz = color.spectrum_to_xyz(reflectance, options.pipeline)
     srgb = color.from_xyz(xyz, "srgb", options.pipeline)
     result = {
@@ -127,13 +131,13 @@ def swatch(options: Namespace) -> Outcome:
         f"{result['srgb_hex']}  L* {lightness:.2f}  a* {a:.2f}  b* {b:.2f}  "
         f"linear sRGB {srgb[0]:.4f} {srgb[1]:.4f} {srgb[2]:.4f}"
     )
-    if options.png:
+    if options.png is not None:
         from lutgen import preview
 
         try:
             preview.draw_swatch(skin, result).save(options.png, format="PNG")
         except OSError as error:
-            raise InputError(f"png = {options.png}: cannot be written ({error.strerror or error})") from error
+            raise cannot_write("png", options.png, error) from error
     return result, text, 0
 
 
@@ -162,7 +166,7 @@ def info(options: Namespace) -> Outcome:
         )
     else:
         lines.append("color: expanded from stored paths, its error not measured")
-    sizes = {name: (folder / name).stat().st_size for name in manifest.FILES}
+    sizes = {name: (folder / name).stat().st_size for name in manifest.EXR_FILES}
     lines += [f"{name}: {size / 1000:.0f} kB" for name, size in sizes.items()]
     return facts | {"bytes": sizes}, "\n".join(lines), 0
 
@@ -172,7 +176,8 @@ def devices(options: Namespace) -> Outcome:
     from lutgen import device as ocl
 
     found = ocl.devices()
-    ocl.choose()  # says what to install where there is none
+    if not found:
+        raise MachineError(f"no OpenCL device; {ocl.INSTALL_HINT}")
     rows = [
         {"index": i, "name": d.name, "platform": d.platform, "kind": d.kind, "lanes": d.lanes}
         for i, d in enumerate(found)

@@ -13,7 +13,7 @@ from pathlib import Path
 from lutgen import quadrature, tissue
 from lutgen.axes import Axis, Grid, default_grid
 from lutgen.color import PIPELINES
-from lutgen.errors import InputError, one_of, whole
+from lutgen.errors import InputError, one_of, shown, whole
 from lutgen.paths import PHOTONS, SEEDS
 from lutgen.tissue import Skin
 
@@ -40,13 +40,13 @@ class Recipe:
     skin: Skin = field(default_factory=lambda: Skin(0.0195, 0.7, 0.0088))
 
     def __post_init__(self):
-        whole("photons", self.photons, *PHOTONS)
-        whole("seed", self.seed, *SEEDS)
+        object.__setattr__(self, "photons", whole("photons", self.photons, *PHOTONS))
+        object.__setattr__(self, "seed", whole("seed", self.seed, *SEEDS))
         one_of("wavelengths", self.wavelengths, quadrature.NAMES)
         one_of("totals", self.totals, TOTALS)
         one_of("pipeline", self.pipeline, PIPELINES)
-        if self.rings not in RINGS:
-            raise InputError(f"rings = {self.rings!r}: allowed is {', '.join(map(str, RINGS))}")
+        if isinstance(self.rings, bool) or not isinstance(self.rings, int) or self.rings not in RINGS:
+            raise InputError(f"rings = {shown(self.rings)}: allowed is {', '.join(map(str, RINGS))}")
         tissue.require_one_scatterer(self.skin)
 
     def as_dict(self) -> dict:
@@ -115,10 +115,10 @@ def _axis(axis: Axis, keys: Mapping) -> Axis:
     return replace(axis, **keys)
 
 
-def _table(name: str, values: Mapping, shown: str | None = None) -> Mapping:
+def _table(name: str, values: Mapping, where: str | None = None) -> Mapping:
     table = values.get(name, {})
     if not isinstance(table, Mapping):
-        raise InputError(f"{shown or name} = {table!r}: a table of keys is needed")
+        raise InputError(f"{where or name} = {shown(table)}: a table of keys is needed")
     return table
 
 
@@ -135,9 +135,11 @@ def load(path: str | Path, base: Recipe | None = None) -> Recipe:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"recipe {path}: cannot be read ({error}); give a TOML file like luts/bake.toml") from error
     try:
-        return from_dict(tomllib.loads(text), base)
-    except tomllib.TOMLDecodeError as error:
+        values = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
         raise InputError(f"recipe {path}: not TOML ({error})") from error
+    try:
+        return from_dict(values, base)
     except InputError as error:
         raise InputError(f"recipe {path}: {error}") from error
 
@@ -150,4 +152,6 @@ def coerce(recipe: Recipe | Mapping | str | Path | None) -> Recipe:
         return recipe
     if isinstance(recipe, Mapping):
         return from_dict(recipe)
+    if not isinstance(recipe, (str, Path)):
+        raise InputError(f"recipe = {shown(recipe)}: a Recipe, a table of keys, a TOML path or a quality is needed")
     return QUALITIES[str(recipe)] if str(recipe) in QUALITIES else load(recipe)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
+import site
 import sys
 import tempfile
 import warnings
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -38,22 +41,29 @@ class Device:
 
 def _register_pip_runtime() -> None:
     """Let the loader find Intel's CPU runtime from pip, which registers itself nowhere: preload it, point to it."""
-    library = Path(sys.prefix) / "lib"
-    driver = library / "libintelocl.so"
-    if not driver.exists() or "OCL_ICD_FILENAMES" in os.environ or "OCL_ICD_VENDORS" in os.environ:
+    if "OCL_ICD_FILENAMES" in os.environ or "OCL_ICD_VENDORS" in os.environ:
+        return
+    driver = next((path for path in _pip_drivers() if path.exists()), None)
+    if driver is None:
         return
     import ctypes
 
     try:
         for name in ("libintlc.so.5", "libimf.so", "libirng.so", "libsvml.so", "libtbb.so.12"):
-            ctypes.CDLL(str(library / name), mode=ctypes.RTLD_GLOBAL)
+            ctypes.CDLL(str(driver.parent / name), mode=ctypes.RTLD_GLOBAL)
+        vendors = Path(tempfile.mkdtemp(prefix="lutgen-icd-"))
+        atexit.register(shutil.rmtree, vendors, ignore_errors=True)
+        for source in Path("/etc/OpenCL/vendors").glob("*.icd"):
+            (vendors / source.name).write_text(source.read_text())
+        (vendors / "intel-cpu-pip.icd").write_text(f"{driver}\n")
     except OSError:
         return
-    vendors = Path(tempfile.mkdtemp(prefix="lutgen-icd-"))
-    for source in Path("/etc/OpenCL/vendors").glob("*.icd"):
-        (vendors / source.name).write_text(source.read_text())
-    (vendors / "intel-cpu-pip.icd").write_text(f"{driver}\n")
     os.environ["OCL_ICD_VENDORS"] = str(vendors)
+
+
+def _pip_drivers() -> list[Path]:
+    """Where pip puts Intel's driver: the environment's lib folder, or the user's."""
+    return [Path(root) / "lib" / "libintelocl.so" for root in (sys.prefix, site.getuserbase())]
 
 
 @cache
@@ -76,10 +86,11 @@ def _lanes(cl: ModuleType, device) -> int:
 def devices() -> tuple[Device, ...]:
     """Every OpenCL device, best first: GPUs, then PoCL, then other CPU runtimes; empty where there is none."""
     cl = _opencl()
-    try:
-        found = [device for platform in cl.get_platforms() for device in platform.get_devices()]
-    except cl.Error:
-        found = []
+    found = []
+    with suppress(cl.Error):
+        for platform in cl.get_platforms():
+            with suppress(cl.Error):  # one broken driver must not hide the others
+                found += platform.get_devices()
     kinds = {cl.device_type.GPU: "gpu", cl.device_type.CPU: "cpu"}
     ranked = []
     for device in found:
@@ -92,27 +103,42 @@ def devices() -> tuple[Device, ...]:
     )
 
 
-@cache
-def choose(name: str | None = None) -> Device:
+def choose(name: str | int | None = None) -> Device:
     """Open the device whose index or part of name or platform is given, else LUTGEN_DEVICE's, else the best.
 
     Raises MachineError where there is no OpenCL, InputError where nothing matches.
     """
-    name = name or os.environ.get("LUTGEN_DEVICE") or None
+    given = "device" if name not in (None, "") else "LUTGEN_DEVICE"
+    wanted = str(name) if given == "device" else os.environ.get("LUTGEN_DEVICE", "")
     available = devices()
     if not available:
         raise MachineError(f"no OpenCL device; {INSTALL_HINT}")
-    matches = available
-    if name is not None:
-        matches = [
-            d for i, d in enumerate(available) if name == str(i) or name.lower() in f"{d.platform} {d.name}".lower()
-        ]
+    if wanted.isdigit():
+        matches = available[int(wanted) : int(wanted) + 1]
+    else:
+        matches = [d for d in available if wanted.lower() in f"{d.platform} {d.name}".lower()]
     if not matches:
         listed = ", ".join(f"{i} ({d.platform}: {d.name})" for i, d in enumerate(available))
-        raise InputError(f"device = {name!r}: no device matches; allowed is an index or part of a name of {listed}")
-    cl, best = _opencl(), matches[0]
-    context = cl.Context([best.context])
-    return Device(best.name, best.platform, best.kind, best.lanes, context, cl.CommandQueue(context))
+        raise InputError(f"{given} = {wanted!r}: no device matches; allowed is an index or part of a name of {listed}")
+    return _open(matches[0])
+
+
+@cache
+def _open(device: Device) -> Device:
+    cl = _opencl()
+    with _reported(device):
+        context = cl.Context([device.context])
+        return replace(device, context=context, queue=cl.CommandQueue(context))
+
+
+@contextmanager
+def _reported(device: Device):
+    """OpenCL's own errors (out of memory, a lost device) as MachineErrors of one line."""
+    cl = _opencl()
+    try:
+        yield
+    except cl.Error as error:
+        raise MachineError(f"device {device.name}: {str(error).strip().splitlines()[0]}") from error
 
 
 def source(*names: str) -> str:
@@ -169,19 +195,22 @@ def buffer(device: Device, data: np.ndarray | int):
     """A device buffer holding a copy of an array, or of that many uninitialized bytes."""
     cl = _opencl()
     flags = cl.mem_flags
-    if isinstance(data, (int, np.integer)):
-        return cl.Buffer(device.context, flags.READ_WRITE, int(data))
-    return cl.Buffer(device.context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=np.ascontiguousarray(data))
+    with _reported(device):
+        if isinstance(data, (int, np.integer)):
+            return cl.Buffer(device.context, flags.READ_WRITE, int(data))
+        return cl.Buffer(device.context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=np.ascontiguousarray(data))
 
 
 def launch(device: Device, compiled, shape: tuple[int, ...], *arguments) -> None:
     """Run a kernel over a global size and wait for it."""
     local = (1,) * len(shape) if device.kind == "cpu" else None
-    compiled(device.queue, shape, local, *arguments)
-    device.queue.finish()  # type: ignore[attr-defined]
+    with _reported(device):
+        compiled(device.queue, shape, local, *arguments)
+        device.queue.finish()  # type: ignore[attr-defined]
 
 
 def read(device: Device, source_buffer, like: np.ndarray) -> np.ndarray:
     """Copy a device buffer into the given array and return it."""
-    _opencl().enqueue_copy(device.queue, like, source_buffer)
+    with _reported(device):
+        _opencl().enqueue_copy(device.queue, like, source_buffer)
     return like

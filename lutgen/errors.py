@@ -1,6 +1,12 @@
 """The two ways to fail: what the user gave is wrong (exit status 2), or the machine cannot do it (exit status 1)."""
 
+from __future__ import annotations
+
+import errno
 import operator
+from pathlib import Path
+
+import numpy as np
 
 
 class InputError(ValueError):
@@ -23,29 +29,57 @@ class MachineError(RuntimeError):
     """
 
 
+def shown(value: object) -> str:
+    """A value's repr, shortened to one line."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of thousands of digits
+        text = f"a {type(value).__name__} too long to print"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def in_range(name: str, value: object, low: float, high: float, unit: str = "") -> float:
     """Return `value` as a float in [low, high]; raise InputError that names it otherwise (NaN included)."""
-    if isinstance(value, bool) or (not isinstance(value, (int, float)) and not hasattr(value, "__float__")):
-        raise InputError(f"{name} = {value!r}: a number in {low:g} to {high:g}{unit} is needed")
-    number = float(value)  # type: ignore[arg-type]
+    try:
+        if isinstance(value, (bool, str, bytes)):
+            raise TypeError
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} = {shown(value)}: a number in {low:g} to {high:g}{unit} is needed") from None
     if not low <= number <= high:
         raise InputError(f"{name} = {number:g}: allowed is {low:g} to {high:g}{unit}")
     return number
 
 
-def one_of(name: str, value: object, allowed: "tuple[str, ...] | list[str]") -> str:
+def one_of(name: str, value: object, allowed: tuple[str, ...] | list[str]) -> str:
     """Return `value` if it is one of `allowed`; raise InputError that lists them otherwise."""
-    if value not in allowed:
-        raise InputError(f"{name} = {value!r}: allowed is {', '.join(allowed)}")
+    if not isinstance(value, str) or value not in allowed:
+        raise InputError(f"{name} = {shown(value)}: allowed is {', '.join(allowed)}")
     return str(value)
 
 
 def whole(name: str, value: object, low: int, high: int) -> int:
-    """Return `value` if it is a whole number in [low, high]; raise InputError that names it otherwise."""
+    """Return `value` as an int if it is a whole number in [low, high]; raise InputError that names it otherwise."""
     try:
         number = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         number = None
     if number is None or isinstance(value, bool) or not low <= number <= high:
-        raise InputError(f"{name} = {value!r}: allowed is a whole number {low} to {high}")
+        raise InputError(f"{name} = {shown(value)}: allowed is a whole number {low} to {high}")
     return number
+
+
+def numbers(name: str, value: object) -> np.ndarray:
+    """Return `value` as an array of floats; raise InputError that names it where it holds anything else."""
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {shown(value)}: a number or an array of numbers is needed") from None
+
+
+def cannot_write(name: str, path: str | Path, error: OSError) -> InputError | MachineError:
+    """What to raise where writing failed: MachineError for a full disk, InputError for a path that does not take it."""
+    reason = error.strerror or str(error)
+    if error.errno in (errno.ENOSPC, errno.EDQUOT) or "No space left" in str(error):
+        return MachineError(f"{name} = {path}: cannot be written ({reason}); free some space")
+    return InputError(f"{name} = {path}: cannot be written ({reason}); choose another place")

@@ -10,7 +10,7 @@ import numpy as np
 from lutgen import chromophores
 from lutgen.axes import Grid
 from lutgen.color import ACESCG_FROM_XYZ
-from lutgen.errors import InputError
+from lutgen.errors import InputError, numbers, shown
 from lutgen.paths import PathTable
 
 ExtraAbsorbers = Mapping[str, "float | np.ndarray | Callable[[np.ndarray], np.ndarray]"]
@@ -28,10 +28,12 @@ class Absorbers:
 def absorbers(wavelength_nm: np.ndarray, oxygenation: float, extra: ExtraAbsorbers | None = None) -> Absorbers:
     """Absorbers at wavelengths [K]; `extra` maps a layer to 1/mm: a number, an array [K] or a function of nm."""
     added = {"epidermis": np.zeros(len(wavelength_nm)), "dermis": np.zeros(len(wavelength_nm))}
+    if not isinstance(extra or {}, Mapping):
+        raise InputError(f"extra_absorbers = {shown(extra)}: a mapping of epidermis or dermis to 1/mm is needed")
     for layer, value in (extra or {}).items():
         if layer not in added:
             raise InputError(f"extra_absorbers: unknown layer {layer!r}: allowed is epidermis, dermis")
-        values = np.asarray(value(wavelength_nm) if callable(value) else value, float)
+        values = numbers(f"extra_absorbers[{layer!r}]", value(wavelength_nm) if callable(value) else value)
         if values.shape not in ((), wavelength_nm.shape) or not np.all(np.isfinite(values)) or np.any(values < 0):
             raise InputError(
                 f"extra_absorbers[{layer!r}] = {values}: finite coefficients of 0 or more in 1/mm are needed, "

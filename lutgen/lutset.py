@@ -9,7 +9,7 @@ import numpy as np
 
 from lutgen import color, expansion, profiles
 from lutgen.axes import Grid
-from lutgen.errors import InputError, in_range, one_of
+from lutgen.errors import InputError, in_range, numbers, one_of, shown
 from lutgen.paths import PathTable
 from lutgen.profiles import Profile
 from lutgen.tissue import Skin
@@ -89,7 +89,7 @@ class LutSet:
         (3,)
         """
         one_of("space", space, color.SPACES)
-        self._inside(self.color_lut.grid, melanin, eumelanin, hemoglobin)
+        melanin, eumelanin, hemoglobin = self._inside(self.color_lut.grid, melanin, eumelanin, hemoglobin)
         acescg = self.color_lut.grid.interpolate(self.color_lut.acescg, melanin, eumelanin, hemoglobin)
         return color.from_acescg(acescg, space, self.pipeline)
 
@@ -100,10 +100,10 @@ class LutSet:
         >>> bool((lutgen.load().color_std_error(0.02, 0.7, 0.01) < 1e-3).all())
         True
         """
-        skins = [np.atleast_1d(np.asarray(v, float)) for v in (melanin, eumelanin, hemoglobin)]
+        skins = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (melanin, eumelanin, hemoglobin)))
         if self.manifest["recipe"]["totals"] == "anchored":
             return np.zeros((len(skins[0]), 3))
-        mu = expansion.coefficients(self.paths.wavelength_nm, self.absorbers, *np.broadcast_arrays(*skins))
+        mu = expansion.coefficients(self.paths.wavelength_nm, self.absorbers, *skins)
         return np.sqrt(np.einsum("kp,kc->pc", self.totals.std_error(*mu)[:, 0] ** 2, self.weights**2))
 
     def profile(self, melanin, eumelanin, hemoglobin, space: str = "acescg") -> Profile:
@@ -151,7 +151,7 @@ class LutSet:
         recipe = dict(self.manifest["recipe"])
         recipe["skin"] = dict(recipe["skin"], oxygenation=oxygenation)
         extra = {name: getattr(absorb, name).tolist() for name in ("epidermis", "dermis")}
-        manifest = self.manifest | {
+        manifest = {key: value for key, value in self.manifest.items() if key not in _OF_ITS_BAKE} | {
             "recipe": recipe, "extra_absorbers_per_mm": extra, "largest_clamped_share": float(clamped.max()),
             "error": None, "files": {},
         }  # fmt: skip
@@ -165,7 +165,7 @@ class LutSet:
     def recolor(self, albedo_rgb, base, target, space: str = "srgb") -> np.ndarray:
         """albedo x color(target) / color(base): a painted albedo [..., 3], linear, moved to another skin, detail kept.
 
-        `base` and `target` are Skins or (melanin, eumelanin, hemoglobin).
+        `base` and `target` are (melanin, eumelanin, hemoglobin), or Skins whose other fields are the set's own.
 
         >>> import lutgen
         >>> luts = lutgen.load()
@@ -173,25 +173,40 @@ class LutSet:
         >>> bool(np.allclose(luts.recolor(albedo, (0.02, 0.7, 0.01), (0.1, 0.7, 0.01)), luts.color(0.1, 0.7, 0.01)))
         True
         """
-        albedo = np.asarray(albedo_rgb, float)
+        albedo = numbers("albedo_rgb", albedo_rgb)
         if albedo.shape[-1:] != (3,):
             raise InputError(f"albedo_rgb has shape {albedo.shape}: the last axis must hold R, G, B")
-        before, after = (self.color(*_chromophores(skin), space=space) for skin in (base, target))
+        before, after = (self.color(*self._chromophores(skin), space=space) for skin in (base, target))
         return albedo * (after / before)
 
-    def _inside(self, grid: Grid, melanin, eumelanin, hemoglobin) -> None:
-        for axis, values in ((grid.melanin, melanin), (grid.eumelanin, eumelanin), (grid.hemoglobin, hemoglobin)):
-            values = np.asarray(values, float)
+    def _chromophores(self, skin) -> tuple:
+        if isinstance(skin, Skin):
+            for name, value in self.manifest["recipe"]["skin"].items():
+                if getattr(skin, name) != value:
+                    advice = "expand the set to it first" if name == "oxygenation" else "bake a set with it first"
+                    raise InputError(f"{name} = {getattr(skin, name)}: these LUTs hold {value}; {advice}")
+            return skin.melanin, skin.eumelanin, skin.hemoglobin
+        if not isinstance(skin, (tuple, list, np.ndarray)) or len(skin) != 3:
+            raise InputError(f"skin = {shown(skin)}: a Skin or (melanin, eumelanin, hemoglobin) is needed")
+        return tuple(skin)
+
+    def _inside(self, grid: Grid, melanin, eumelanin, hemoglobin) -> tuple[np.ndarray, ...]:
+        """The chromophores as arrays; InputError where they leave the axes or do not broadcast."""
+        arrays = [numbers(name, v) for name, v in zip(_NAMES, (melanin, eumelanin, hemoglobin), strict=True)]
+        for axis, values in zip((grid.melanin, grid.eumelanin, grid.hemoglobin), arrays, strict=True):
             slack = 1e-9 * max(abs(axis.high), 1e-9)
             wrong = ~((values >= axis.low - slack) & (values <= axis.high + slack))
             if wrong.any():
                 raise InputError(
                     f"{axis.name} = {values[wrong].ravel()[0]:g}: these LUTs cover {axis.low:g} to {axis.high:g}"
                 )
+        try:
+            np.broadcast_shapes(*(values.shape for values in arrays))
+        except ValueError:
+            shapes = ", ".join(str(values.shape) for values in arrays)
+            raise InputError(f"melanin, eumelanin, hemoglobin have shapes {shapes}: they must broadcast") from None
+        return tuple(arrays)
 
 
 _NAMES = ("melanin", "eumelanin", "hemoglobin")
-
-
-def _chromophores(skin) -> tuple[float, float, float]:
-    return (skin.melanin, skin.eumelanin, skin.hemoglobin) if isinstance(skin, Skin) else tuple(skin)
+_OF_ITS_BAKE = ("seconds", "baked_at", "host")

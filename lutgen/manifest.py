@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import errno
 import hashlib
 import json
 import os
+import secrets
 import shutil
 from dataclasses import asdict
 from pathlib import Path
@@ -16,20 +15,25 @@ import numpy as np
 from lutgen import exr
 from lutgen.axes import Axis, Grid
 from lutgen.color import ACESCG_FROM_XYZ
-from lutgen.errors import InputError, MachineError
+from lutgen.errors import InputError, cannot_write, shown
 from lutgen.lutset import ColorLut, LutSet, ProfileLut
 from lutgen.paths import PathTable
 
 FORMAT = 1
 EXR_FILES = ("color.exr", "profile.exr", "paths.exr")
 FILES = (*EXR_FILES, "preview.png")
+FACTS = ("lutgen", "recipe", "meaning", "quadrature", "trace", "optical_data", "extra_absorbers_per_mm")
+"""What every EXR part repeats of the manifest, and must agree in."""
 
 MEANING = {
     "color": "share of incident light that leaves diffusely, light collimated along the normal from air; includes the "
     "entry transmission 1 - R_specular (0.9722 at n 1.4), excludes the specular part. Multiply irradiance by "
     "T(theta)/T(0) with your own Fresnel, never by 1 - F again. At other incidence the true value moves: "
     "R(60 deg)/R(0) is 0.91 to 1.28, hemispherical/R(0) 0.92 to 1.15, most on dark skin",
-    "space": "linear, unclipped, scene-referred ACEScg (AP1 primaries, ACES white) under D65; adapted by CAT02",
+    "exit_lobe": "F_t(cos) cos / (0.923 pi) at n 1.4, F_t the Fresnel transmission outward: 1.053 x Lambert head-on",
+    "space": "linear, unclipped, scene-referred ACEScg (AP1 primaries, ACES white), adapted from D65 by CAT02",
+    "pipelines": "default: CIE 1931 2 degree functions under the CIE D65 spectrum; source: CIE 2015 2 degree functions "
+    "under equal energy, XYZ scaled to the D65 white",
     "acescg_from_xyz_d65": ACESCG_FROM_XYZ.tolist(),
     "color_exr": "strip: within a tile melanin along x, tiles along eumelanin, hemoglobin along y, first row lowest",
     "texture_coordinate": "u = (x (N - 1) + 0.5) / N with x in 0 to 1 after the axis warp; a one-node axis has u = 0.5",
@@ -52,11 +56,7 @@ def _grid(entry: dict) -> Grid:
 
 def _parts(luts: LutSet) -> dict[str, list[exr.Part]]:
     """The EXR files' images; every file carries what its numbers depend on, and no time or host."""
-    facts = {
-        key: luts.manifest[key]
-        for key in ("lutgen", "recipe", "meaning", "quadrature", "trace", "optical_data", "extra_absorbers_per_mm")
-    }
-    facts["format"] = FORMAT
+    facts = {key: luts.manifest[key] for key in FACTS} | {"format": FORMAT}
     N_h, N_e, N_m = luts.color_lut.grid.shape
     strip = luts.color_lut.acescg.astype("f4").reshape(N_h, N_e * N_m, 3)
     color_facts = facts | {"grid": grid_entry(luts.color_lut.grid)}
@@ -98,61 +98,80 @@ def save(luts: LutSet, out: str | Path, force: bool = False, notes: dict | None 
     ...     lutgen.load(out).oxygenation
     0.4
     """
-    out = Path(out)
-    check_target(out, force)
-    partial, old = _sibling(out, "partial"), _sibling(out, "old")
+    target = check_target(out, force)
+    partial, old = (_sibling(target, kind) for kind in ("partial", "old"))
     try:
         partial.mkdir()
         for name, parts in _parts(luts).items():
             exr.write(partial / name, parts)
-        from lutgen import preview
+        from lutgen import preview  # Pillow stays off the path of those who only load
 
         preview.draw(luts).save(partial / "preview.png")
-        hashes = {name: hashlib.sha256((partial / name).read_bytes()).hexdigest() for name in FILES}
+        hashes = {name: _sha256(partial / name) for name in FILES}
         manifest = luts.manifest | {"format": FORMAT, "files": hashes} | (notes or {})
         (partial / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
         for path in (*partial.iterdir(), partial):
             _sync(path)
-        if out.exists():
-            out.rename(old)
-        partial.rename(out)
-        _sync(out.parent)
+        if target.exists():
+            target.rename(old)
+        partial.rename(target)
+        _sync(target.parent)
     except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT) or "No space left" in str(error)
-        kind = MachineError if full else InputError
-        advice = "free some space" if full else "choose another folder"
-        raise kind(f"out = {out}: cannot be written ({error.strerror or error}); {advice}") from error
+        raise cannot_write("out", out, error) from error
     finally:
-        if old.exists() and not out.exists():
-            old.rename(out)
+        if old.exists() and not target.exists():
+            old.rename(target)
         for leftover in (partial, old):
             shutil.rmtree(leftover, ignore_errors=True)
-    return out
+    return Path(out)
 
 
-def check_target(out: Path, force: bool) -> None:
-    """Raise InputError, before any work, where a set cannot be written to `out`; clear what killed bakes left."""
-    if out.exists() or out.is_symlink():
-        if not force:
-            raise InputError(f"out = {out}: exists; give another folder, or --force to replace it")
-        if not out.is_dir() or (any(out.iterdir()) and not (out / "manifest.json").exists()):
-            raise InputError(f"out = {out}: is not a LUT set, so --force does not replace it; give another folder")
-    parent = out.absolute().parent
-    if not parent.is_dir():
-        raise InputError(f"out = {out}: there is no folder {parent}; make it first")
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise InputError(f"out = {out}: folder {parent} cannot be written; choose another folder")
-    for leftover in parent.glob(f".{out.name}.*-*"):
-        kind, _, process = leftover.name.removeprefix(f".{out.name}.").partition("-")
-        if kind in ("partial", "old") and process.isdigit() and not _running(int(process)):
-            if kind == "old" and not out.exists():
-                leftover.rename(out)  # a replacement was killed between its two renames: the old set comes back
-                return check_target(out, force)
-            shutil.rmtree(leftover, ignore_errors=True)
-    return None
+def check_target(out: str | Path, force: bool) -> Path:
+    """The real folder to write to; InputError, before any work, where a set cannot go there.
+
+    Clears what killed bakes left, and brings back a set whose replacement was killed between its two renames.
+    """
+    if not str(out):
+        raise InputError("out = '': the name of a folder is needed")
+    try:
+        target = Path(os.path.realpath(out))
+        if len(os.fsencode(target.name)) > 200:
+            raise InputError(f"out = {shown(str(out))}: the name is too long; allowed are 200 bytes")
+        if target.parent.is_dir():
+            _clear_leftovers(target)
+        if target.exists():
+            if not force:
+                raise InputError(f"out = {out}: exists; give another folder, or --force to replace it")
+            if not target.is_dir() or (any(target.iterdir()) and not (target / "manifest.json").exists()):
+                raise InputError(f"out = {out}: is not a LUT set, so --force does not replace it; give another folder")
+        if not target.parent.is_dir():
+            raise InputError(f"out = {out}: there is no folder {target.parent}; make it first")
+        if not os.access(target.parent, os.W_OK | os.X_OK):
+            raise InputError(f"out = {out}: folder {target.parent} cannot be written; choose another folder")
+    except OSError as error:
+        raise cannot_write("out", shown(str(out)), error) from error
+    return target
+
+
+def _clear_leftovers(target: Path) -> None:
+    for leftover in list(target.parent.iterdir()):
+        kind, _, rest = leftover.name.removeprefix(f".{target.name}.").partition("-")
+        process = rest.partition("-")[0]
+        if leftover.name.startswith(f".{target.name}.") and kind in ("partial", "old") and process.isdigit():
+            if _running(int(process)):
+                continue
+            if kind == "old" and not target.exists():
+                leftover.rename(target)
+            else:
+                shutil.rmtree(leftover, ignore_errors=True)
 
 
 def _running(process: int) -> bool:
+    """Whether another process of that number lives; one of this number is an earlier one's (containers reuse them)."""
+    if process == os.getpid():
+        return False
+    if os.name == "nt":
+        return True  # os.kill(process, 0) would interrupt it there; what it left stays
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -162,17 +181,23 @@ def _running(process: int) -> bool:
     return True
 
 
-def _sibling(out: Path, kind: str) -> Path:
-    return out.absolute().parent / f".{out.name}.{kind}-{os.getpid()}"
+def _sibling(target: Path, kind: str) -> Path:
+    return target.parent / f".{target.name}.{kind}-{os.getpid()}-{secrets.token_hex(4)}"
 
 
 def _sync(path: Path) -> None:
-    with contextlib.suppress(PermissionError):  # Windows cannot open folders
-        handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+    """Flush a file or folder to disk; Windows wants files open for writing and has no such call for folders."""
+    if os.name == "nt" and path.is_dir():
+        return
+    handle = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def load(path: str | Path) -> LutSet:
@@ -182,17 +207,26 @@ def load(path: str | Path) -> LutSet:
     >>> lutgen.load().color_lut.grid.shape
     (16, 8, 16)
     """
+    if not isinstance(path, (str, Path)):
+        raise InputError(f"path = {shown(path)}: the folder of a LUT set is needed")
     folder = Path(path)
     manifest = read_manifest(folder)
-    for name in EXR_FILES:
-        _verify(folder, name, manifest)
-    images = {name: exr.read(folder / name) for name in EXR_FILES}
     try:
+        images = {}
+        for name in EXR_FILES:
+            verify(folder, name, manifest)
+            images[name] = exr.read(folder / name)
+            for part in images[name].values():
+                for key in FACTS:
+                    if part.attributes[key] != manifest[key]:
+                        raise ValueError(f"the {key} of {name} is not the manifest's")
         return _assemble(images, manifest)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        if isinstance(error, InputError):
-            raise InputError(f"{folder}: {error}; bake it anew") from error
-        raise InputError(f"{folder}: manifest and EXR files disagree ({error!r}); bake it anew") from error
+    except InputError as error:
+        raise InputError(
+            f"{error}" if str(error).startswith(str(folder)) else f"{folder}: {error}; bake it anew"
+        ) from error
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise InputError(f"{folder}: manifest and EXR files disagree ({error}); bake it anew") from error
 
 
 def read_manifest(folder: Path) -> dict:
@@ -203,18 +237,24 @@ def read_manifest(folder: Path) -> dict:
         raise InputError(f"{folder}: no LUT set there (no manifest.json); bake one with `lutgen bake`") from error
     except (OSError, ValueError) as error:
         raise InputError(f"{folder}: manifest.json cannot be read ({error}); bake it anew") from error
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        found = manifest.get("format") if isinstance(manifest, dict) else None
-        raise InputError(f"{folder}: manifest format = {found!r}: this version reads {FORMAT}; bake it anew")
+    found = manifest.get("format") if isinstance(manifest, dict) else None
+    if type(found) is not int or found != FORMAT:
+        raise InputError(f"{folder}: manifest format = {shown(found)}: this version reads {FORMAT}; bake it anew")
+    missing = [key for key in (*FACTS, "color_grid", "profile_grid", "error", "files") if key not in manifest]
+    if missing or not isinstance(manifest["files"], dict) or not isinstance(manifest["error"], (dict, type(None))):
+        raise InputError(
+            f"{folder}: manifest.json lacks {', '.join(missing) or 'files or error as tables'}; bake it anew"
+        )
     return manifest
 
 
-def _verify(folder: Path, name: str, manifest: dict) -> None:
+def verify(folder: Path, name: str, manifest: dict) -> None:
+    """Raise InputError unless a file of the set is the one that its manifest names."""
     try:
-        found = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+        found = _sha256(folder / name)
     except OSError as error:
         raise InputError(f"{folder / name}: cannot be read ({error.strerror}); bake the set anew") from error
-    if found != manifest.get("files", {}).get(name):
+    if found != manifest["files"].get(name):
         raise InputError(f"{folder / name}: is not the file that manifest.json names (SHA-256 differs); bake it anew")
 
 
@@ -225,9 +265,6 @@ def _assemble(images: dict[str, dict[str, exr.Part]], manifest: dict) -> LutSet:
     for part, key in ((strip, "color_grid"), (energy, "profile_grid")):
         if part.attributes["grid"] != manifest[key]:
             raise ValueError(f"the axes of {part.name} are not the manifest's {key}")
-    for key in ("recipe", "quadrature"):
-        if strip.attributes[key] != manifest[key]:
-            raise ValueError(f"the {key} of color.exr is not the manifest's")
     color_grid, profile_grid = _grid(manifest["color_grid"]), _grid(manifest["profile_grid"])
     facts = stored.attributes
     mu_e, mu_d = np.array(facts["mu_epidermis"]), np.array(facts["mu_dermis"])

@@ -125,7 +125,10 @@ class PathTable:
 
     def anchored(self, exact_totals: np.ndarray) -> PathTable:
         """The table with each node's rings scaled to exact totals [K, E, D]: Monte Carlo shape, no noise in sums."""
-        scale = exact_totals / self.energy.sum(axis=1, dtype=float)
+        sums = self.energy.sum(axis=1, dtype=float)
+        if not np.all(sums > 0):
+            raise InputError(f"photons = {self.photons}: too few for anchored totals; ask for more, or for monte-carlo")
+        scale = exact_totals / sums
         return replace(self, energy=(self.energy * scale[:, None]).astype(self.energy.dtype))
 
 

@@ -8,7 +8,7 @@ from PIL import Image
 from lutgen import color, profiles
 from lutgen.axes import Axis, Grid
 from lutgen.lutset import LutSet
-from lutgen.sheet import GRAY, INK, OVERSAMPLE, PAPER, RULE, Box, Sheet
+from lutgen.paper import GRAY, INK, OVERSAMPLE, PAPER, RULE, Box, Sheet
 from lutgen.tissue import PRESETS, Skin
 
 WIDTH, HEIGHT = 1200, 760

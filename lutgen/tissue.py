@@ -8,12 +8,21 @@ from types import MappingProxyType
 import numpy as np
 
 from lutgen import chromophores
-from lutgen.errors import InputError, in_range, one_of
+from lutgen.errors import InputError, in_range, one_of, shown
 
 LAWS = ("source", "bashkatov", "jacques", "saidi", "donner")
 READINGS = ("reduced", "similarity", "literal")
 REFRACTIVE_INDEX = 1.4
-EPIDERMIS_MM = (0.001, 1.0)
+EPIDERMIS_MM = (0.001, 0.5)
+
+_LAYER_RANGES = {
+    "thickness_mm": (0, np.inf), "mu_a_per_mm": (0, 1e6), "mu_s_per_mm": (0, 1e6), "g": (-0.9999, 0.9999), "n": (1, 3),
+}  # fmt: skip
+_SKIN_RANGES = {
+    "melanin": chromophores.MELANIN, "eumelanin": chromophores.EUMELANIN, "hemoglobin": chromophores.HEMOGLOBIN,
+    "oxygenation": chromophores.OXYGENATION, "epidermis_mm": EPIDERMIS_MM,
+    "saidi_a_per_mm": (0, 100), "saidi_b_nm4_per_mm": (0, 1e13),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -31,11 +40,8 @@ class Layer:
     n: float = REFRACTIVE_INDEX
 
     def __post_init__(self):
-        in_range("thickness_mm", self.thickness_mm, 0, np.inf)
-        in_range("mu_a_per_mm", self.mu_a_per_mm, 0, 1e6)
-        in_range("mu_s_per_mm", self.mu_s_per_mm, 0, 1e6)
-        in_range("g", self.g, -0.9999, 0.9999)
-        in_range("n", self.n, 1, 3)
+        for name, (low, high) in _LAYER_RANGES.items():
+            object.__setattr__(self, name, in_range(name, getattr(self, name), low, high))
 
 
 @dataclass(frozen=True)
@@ -61,15 +67,15 @@ class Skin:
     saidi_b_nm4_per_mm: float = 8.4e10
 
     def __post_init__(self):
-        in_range("melanin", self.melanin, *chromophores.MELANIN)
-        in_range("eumelanin", self.eumelanin, *chromophores.EUMELANIN)
-        in_range("hemoglobin", self.hemoglobin, *chromophores.HEMOGLOBIN)
-        in_range("oxygenation", self.oxygenation, *chromophores.OXYGENATION)
-        in_range("epidermis_mm", self.epidermis_mm, *EPIDERMIS_MM)
+        for name, (low, high) in _SKIN_RANGES.items():
+            object.__setattr__(self, name, in_range(name, getattr(self, name), low, high))
         one_of("scattering", self.scattering, LAWS)
         one_of("reading", self.reading, READINGS)
-        in_range("saidi_a_per_mm", self.saidi_a_per_mm, 0, 100)
-        in_range("saidi_b_nm4_per_mm", self.saidi_b_nm4_per_mm, 0, 1e13)
+        if self.scattering == "saidi" and self.saidi_a_per_mm < 0.01 and self.saidi_b_nm4_per_mm < 1e9:
+            raise InputError(
+                f"saidi_a_per_mm = {self.saidi_a_per_mm:g} with saidi_b_nm4_per_mm = {self.saidi_b_nm4_per_mm:g}: skin "
+                "that hardly scatters; allowed is A of at least 0.01 or B of at least 1e9"
+            )
 
 
 PRESETS = MappingProxyType(
@@ -128,7 +134,9 @@ def layers(skin: Skin, wavelength_nm: float) -> list[Layer]:
     >>> [round(layer.mu_a_per_mm, 4) for layer in layers(Skin(0.013, 0.7, 0.005), 450)]
     [1.2804, 0.322]
     """
-    in_range("wavelength_nm", wavelength_nm, *chromophores.WAVELENGTH_NM)
+    if not isinstance(skin, Skin):
+        raise InputError(f"skin = {shown(skin)}: a lutgen.Skin is needed; lutgen.preset(name) gives one")
+    wavelength_nm = in_range("wavelength_nm", wavelength_nm, *chromophores.WAVELENGTH_NM)
     mu_s, g = (float(v) for v in scattering(skin, wavelength_nm))
     mu_e = float(chromophores.epidermis(wavelength_nm, skin.melanin, skin.eumelanin))
     mu_d = float(chromophores.dermis(wavelength_nm, skin.hemoglobin, skin.oxygenation))

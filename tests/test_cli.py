@@ -93,8 +93,9 @@ def test_swatch_prints_color_and_json(capsys, tmp_path):
     assert wanted in {rgb for _, rgb in picture.getcolors(1 << 24) or []}
 
 
-def test_swatch_by_monte_carlo_agrees_with_its_sigma(capsys):
-    status, text, _ = run(capsys, "swatch", "--preset", "tan", "--method", "path-table", "--photons", 20000, "--json")
+@pytest.mark.parametrize("method", ["path-table", "direct"])
+def test_swatch_by_monte_carlo_agrees_with_its_sigma(capsys, method):
+    status, text, _ = run(capsys, "swatch", "--preset", "tan", "--method", method, "--photons", 8192, "--json")
     assert status == 0
     found, exact = json.loads(text), lutgen.spectrum(lutgen.preset("tan"))
     z = (np.array(found["reflectance"]) - exact) / np.array(found["std_error"])
@@ -135,6 +136,14 @@ BAD = [
     (["swatch", "--preset", "light", "--method", "magic"], "method = 'magic': allowed is path-table, adding-doubling"),
     (["swatch", "--preset", "light", "--scattering", "donner", "--method", "path-table"], "use method adding-doubling"),
     (["swatch", "--preset", "light", "--png", "/proc/x.png"], "png = /proc/x.png: cannot be written"),
+    (["swatch", "--preset", "light", "--device", "abacus"], "device = 'abacus': no device matches"),
+    (["swatch", "--preset", "light", "--photons", "-5"], "photons = -5: allowed"),
+    (["swatch", "--preset", ""], "preset = '': allowed is very-light"),
+    (["swatch", "--preset", "light", "--saidi-a-per-mm", "9"], "add --scattering saidi"),
+    (["swatch", "--preset", "light", "--method", "direct", "--photons", "0"], "photons = 0: allowed"),
+    (["bake", "--out", ""], "out = '': the name of a folder is needed"),
+    (["bake", "--out", "x" * 300], "the name is too long"),
+    (["info", "a\nb"], "a b: no LUT set there"),
     (["info", "/absent"], "/absent: no LUT set there"),
     (["check", "/absent"], "/absent: no LUT set there"),
     (["paint"], "invalid choice: 'paint'"),
@@ -161,15 +170,11 @@ def test_existing_folder_is_refused_before_any_work(capsys, tmp_path):
 
 def test_no_opencl_is_one_line_status_1(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(ocl, "devices", lambda: ())
-    ocl.choose.cache_clear()
-    try:
-        for arguments in (["devices"], ["bake", "--out", tmp_path / "x"]):
-            status, _, err = run(capsys, *arguments)
-            assert status == 1
-            assert 'pip install "lutgen[cpu]"' in err
-            assert err.count("\n") == 1
-    finally:
-        ocl.choose.cache_clear()
+    for arguments in (["devices"], ["bake", "--out", tmp_path / "x"]):
+        status, _, err = run(capsys, *arguments)
+        assert status == 1
+        assert 'pip install "lutgen[cpu]"' in err
+        assert err.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 
@@ -186,10 +191,18 @@ def test_full_disk_is_status_1(capsys, tmp_path, monkeypatch):
 
 def test_device_is_taken_from_the_environment(monkeypatch):
     monkeypatch.setenv("LUTGEN_DEVICE", "abacus")
-    ocl.choose.cache_clear()
-    with pytest.raises(lutgen.InputError, match="abacus"):
+    with pytest.raises(lutgen.InputError, match="LUTGEN_DEVICE = 'abacus'"):
         ocl.choose()
-    ocl.choose.cache_clear()
+    assert ocl.choose("0").name == ocl.devices()[0].name  # what is asked for goes first
+    monkeypatch.setenv("LUTGEN_DEVICE", "0")
+    assert ocl.choose().name == ocl.devices()[0].name
+
+
+def test_an_index_is_an_index_even_where_names_hold_the_digit():
+    for i, device in enumerate(ocl.devices()):
+        assert (ocl.choose(i).platform, ocl.choose(str(i)).name) == (device.platform, device.name)
+    with pytest.raises(lutgen.InputError, match="device = '99'"):
+        ocl.choose("99")
 
 
 def test_the_runtime_that_pip_brings_serves_too(tmp_path):
@@ -201,12 +214,29 @@ def test_the_runtime_that_pip_brings_serves_too(tmp_path):
     assert json.loads(done.stdout)["error"]["color"]["delta_e00_max"] < 1.5
 
 
-@pytest.mark.parametrize("harm", ["node", "rise", "nan", "preview"])
+def test_a_full_disk_under_a_picture_is_status_1(capsys):
+    status, _, err = run(capsys, "swatch", "--preset", "light", "--png", "/dev/full")
+    assert status == 1
+    assert "free some space" in err
+
+
+def test_a_terminal_without_the_signs_still_gets_its_lines(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "lutgen.cli", "info", str(lutgen.default_luts())],
+        capture_output=True, text=True, env=os.environ | {"PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "E00 max" in done.stdout
+
+
+@pytest.mark.parametrize("harm", ["node", "rise", "nan", "preview", "no preview"])
 def test_check_finds_what_is_wrong(capsys, draft, draft_dir, tmp_path, harm):
     folder = tmp_path / "set"
     shutil.copytree(draft_dir, folder)
     if harm == "preview":
         (folder / "preview.png").write_bytes(b"other")
+    elif harm == "no preview":
+        (folder / "preview.png").unlink()
     else:
         cells = draft.color_lut.acescg.copy()
         if harm == "node":

@@ -83,7 +83,7 @@ def test_logarithm_of_zero_cannot_occur():
     """The least and greatest random bits give a finite path or life, and a uniform number inside (0, 1)."""
     for bits, u, path in ((0, 2.0**-24, 31 * math.log(2)), (0xFFFFFFFF, 1 - 2.0**-24, 0.0)):
         found = evaluate(
-            f"vu bits = {bits}u; out[0] = AS_VF((bits >> 9) | 0x3f800000u) - 0.99999994f;"
+            f"vu bits = {bits}u; out[0] = uniform_of(bits);"
             "out[1] = exponential(bits, 1.0f);",
             np.ones(16), outputs=2,
         )  # fmt: skip
@@ -128,9 +128,11 @@ def test_same_seed_same_result():
 
 
 def test_streams_do_not_overlap():
-    """128-bit keys go through a bijection: states differ; the next states of one stream are not another's start."""
+    """128-bit keys go through a bijection: all states differ, at the start and a thousand draws later."""
     starts = {tuple(c) for block in range(64) for c in draws(3, 500_000, block, 1)[0].T}
     assert len(starts) == 64 * 16
+    later = {tuple(stream[-4:]) for block in range(64) for stream in draws(3, 500_000, block, 1000)[1].T.tolist()}
+    assert len(later) == 64 * 16
 
 
 def test_ending_photons_by_their_life_is_unbiased():

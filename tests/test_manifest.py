@@ -3,6 +3,7 @@
 import errno
 import hashlib
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -80,6 +81,26 @@ def test_existing_folders_are_kept_unless_forced(draft, draft_dir, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
 
+def test_odd_names_and_links(draft, tmp_path):
+    """Pattern signs in a name, a leftover of this very process number, and a link to a set."""
+    manifest.save(draft, tmp_path / "a[*]")
+    leftover = tmp_path / f".q.partial-{os.getpid()}-00000000"
+    leftover.mkdir()
+    real = manifest.save(draft, tmp_path / "q")
+    assert not leftover.exists()
+    (tmp_path / "link").symlink_to(real)
+    manifest.save(draft, tmp_path / "link", force=True)
+    assert (tmp_path / "link").is_symlink()
+    assert {path.name for path in tmp_path.iterdir()} == {"a[*]", "q", "link"}
+
+
+def test_a_killed_replacement_gives_the_old_set_back(draft_dir, tmp_path):
+    shutil.copytree(draft_dir, tmp_path / ".set.old-999999999-00000000")
+    with pytest.raises(lutgen.InputError, match="exists"):
+        manifest.check_target(tmp_path / "set", force=False)
+    manifest.load(tmp_path / "set")
+
+
 def test_force_does_not_replace_what_is_no_set(draft, tmp_path):
     precious = tmp_path / "photos"
     precious.mkdir()
@@ -146,6 +167,16 @@ def test_broken_files_are_named(draft_dir, tmp_path, name, kind):
 
 
 @pytest.mark.parametrize("name", manifest.EXR_FILES)
+def test_files_of_another_bake_are_refused_even_with_a_matching_hash(draft_dir, tmp_path, name):
+    folder = copy_of(draft_dir, tmp_path)
+    jacques = lutgen.bake({"photons": 2048, "skin": {"scattering": "jacques"}})
+    shutil.copy(manifest.save(jacques, tmp_path / "other") / name, folder / name)
+    _restamp(folder, name)
+    with pytest.raises(lutgen.InputError, match="is not the manifest's"):
+        manifest.load(folder)
+
+
+@pytest.mark.parametrize("name", manifest.EXR_FILES)
 @pytest.mark.parametrize("kind", ["truncated", "foreign"])
 def test_broken_images_are_refused_even_with_a_matching_hash(draft_dir, tmp_path, name, kind):
     folder = copy_of(draft_dir, tmp_path)
@@ -175,6 +206,13 @@ def _restamp(folder, name):
         lambda facts: facts.pop("color_grid"),
         lambda facts: facts.update(format=99),
         lambda facts: facts.pop("files"),
+        lambda facts: facts.update(files=[]),
+        lambda facts: facts.update(format=True),
+        lambda facts: facts.update(error="none"),
+        lambda facts: facts.pop("trace"),
+        lambda facts: facts.pop("extra_absorbers_per_mm"),
+        lambda facts: facts["trace"].update(seed=7),
+        lambda facts: facts.update(extra_absorbers_per_mm=3),
     ],
 )
 def test_manifest_and_images_that_disagree_are_refused(draft_dir, tmp_path, change):

@@ -103,14 +103,14 @@ def test_records_obey_geometry():
 
 
 def test_any_split_into_launches_gives_the_same_bytes():
-    photons = 3 * path_table.BLOCK_PHOTONS + 77  # 4 blocks x 3 wavelengths = 12
+    photons = 3 * path_table.BLOCK_PHOTONS["cpu"] + 77  # 4 blocks x 3 wavelengths = 12
     whole, *split = [trace(photons, blocks_per_launch=size) for size in (12, 6, 2, 5, 1)]
     for table in split:
         assert table.energy.tobytes() == whole.energy.tobytes()
 
 
 def test_photons_need_not_fill_blocks():
-    for photons in (1, 15, path_table.BLOCK_PHOTONS + 1):
+    for photons in (1, 15, path_table.BLOCK_PHOTONS["cpu"] + 1):
         tally = path_table.Tally()
         medium, _ = baking.skin_medium(SKIN, NM[:1])
         path_table.walk_only(medium, photons, ocl.choose(), tally)
@@ -124,6 +124,15 @@ def test_every_width_agrees_with_adding_doubling(lanes):
     total, square, medium = path_table.ring_sums(layers, np.array([0, np.inf]), photons, 9, wide(lanes))
     sigma = medium.entry * np.sqrt((square[0] / photons - (total[0] / photons) ** 2) / photons)
     assert abs(medium.entry * total[0] / photons - lutgen.reflectance(layers).diffuse) < 4 * sigma
+
+
+def test_a_gpus_blocks_and_columns_give_the_same_physics():
+    """What a GPU runs, one lane and short blocks with the table's columns shared out, run on the device there is."""
+    gpu = replace(wide(1), kind="gpu")
+    mu = expansion.coefficients(NM, expansion.absorbers(NM, 0.7), np.array([0.02]), np.array([0.7]), np.array([0.02]))
+    table = trace(30_000, device=gpu).totals()
+    exact = totals.exact_totals(SKIN)(NM, *mu)
+    assert np.all(np.abs(table.evaluate(*mu)[:, 0] - exact) < 4 * table.std_error(*mu)[:, 0])
 
 
 def test_wavelengths_and_seeds_have_their_own_streams():
@@ -158,6 +167,13 @@ def test_stacks_it_cannot_represent_are_refused_with_the_method_that_can(layers,
 def test_photons_and_seed_beyond_the_counters_are_refused(photons, seed):
     with pytest.raises(lutgen.InputError, match="(photons|seed) = .*allowed is a whole number"):
         lutgen.reflectance([Layer(np.inf, 1, 10, 0.8)], method="path-table", photons=photons, seed=seed)
+
+
+@pytest.mark.parametrize(("mu_a", "mu_s"), [(100, 1), (1, 0.01), (1000, 10)])
+def test_strong_absorption_ends_within_the_step_budget(mu_a, mu_s):
+    layers = [Layer(np.inf, mu_a, mu_s, 0.8)]
+    found = lutgen.reflectance(layers, method="path-table", photons=200_000)
+    assert abs(found.diffuse - lutgen.reflectance(layers).diffuse) <= 4 * found.std_error + 1e-5
 
 
 def test_reading_below_nu_is_refused():

@@ -14,11 +14,11 @@ import lutgen
 ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"cli"},
-    {"commands", "benchmark", "checking"},
+    {"commands", "benchmark", "checking", "figures", "comparisons", "charting"},
     {"baking"},
     {"solvers"},
-    {"manifest", "preview", "sheet", "device", "exr", "lutset", "expansion"},
-    {"config", "paths", "profiles", "quadrature"},
+    {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
+    {"config", "paths", "profiles", "quadrature", "burley"},
     {"axes", "tissue", "color"},
     {"chromophores"},
     {"errors"},

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 
 import numpy as np
 
-from lutgen.errors import InputError, one_of
+from lutgen.errors import InputError, numbers, one_of, shown, whole
+from lutgen.paths import PHOTONS, SEEDS
 from lutgen.profiles import Profile, default_edges
 from lutgen.tissue import Layer, Skin, layers
 
@@ -14,29 +16,36 @@ METHODS = {"path-table": "path_table", "adding-doubling": "adding_doubling", "di
 """Method name -> module of this package with `reflectance` and, where the method knows radii, `profile`."""
 
 
-def _solver(method: str):
-    return import_module(f"lutgen.solvers.{METHODS[one_of('method', method, tuple(METHODS))]}")
-
-
-def _layers(stack) -> list[Layer]:
-    stack = list(stack)
+def _call(method: str, function: str, layers, *arguments, photons: int, seed: int, options: dict):
+    """Check what all methods share, then call the method's function of that name."""
+    module = import_module(f"lutgen.solvers.{METHODS[one_of('method', method, tuple(METHODS))]}")
+    whole("photons", photons, *PHOTONS)
+    whole("seed", seed, *SEEDS)
+    stack = list(layers) if isinstance(layers, Iterable) else [layers]
     if not stack or not all(isinstance(layer, Layer) for layer in stack):
-        raise InputError(f"layers = {stack!r}: a list of at least one lutgen.Layer is needed")
-    return stack
+        raise InputError(f"layers = {shown(layers)}: a list of at least one lutgen.Layer is needed")
+    if not hasattr(module, function):
+        able = [name for name in METHODS if hasattr(import_module(f"lutgen.solvers.{METHODS[name]}"), function)]
+        raise InputError(f"method = {method!r}: gives no {function}; use {' or '.join(able)}")
+    for name in options:
+        if name not in module.OPTIONS:
+            raise InputError(f"{name}: method {method} has no such option; it has {', '.join(module.OPTIONS)}")
+    return getattr(module, function)(stack, *arguments, photons=photons, seed=seed, **options)
 
 
 def reflectance(layers, method: str = "adding-doubling", photons: int = 100_000, seed: int = 0, **options):
     """Diffuse, specular and transmitted share of light along the normal, with the diffuse share's standard error.
 
-    `layers`: Layers from the surface down. `photons`, `seed` and the option `device` matter to Monte Carlo only; the
-    option `nodes` to adding-doubling. Raises InputError for stacks that the method cannot represent.
+    `layers`: Layers from the surface down. `photons` and `seed` matter to Monte Carlo only. Options: `device` of
+    path-table and direct, `nodes` of adding-doubling, `absorption`, `threshold`, `survivors` of direct. Raises
+    InputError for stacks that the method cannot represent.
 
     >>> import lutgen
     >>> result = lutgen.reflectance(lutgen.layers(lutgen.preset("light"), 550))
     >>> round(result.diffuse, 4), round(result.specular, 4)
     (0.289, 0.0278)
     """
-    return _solver(method).reflectance(_layers(layers), photons=photons, seed=seed, **options)
+    return _call(method, "reflectance", layers, photons=photons, seed=seed, options=options)
 
 
 def profile(
@@ -51,13 +60,12 @@ def profile(
     >>> profile.energy.shape
     (64,)
     """
-    edges = default_edges() if radius_edges_mm is None else np.asarray(radius_edges_mm, float)
+    edges = default_edges() if radius_edges_mm is None else numbers("radius_edges_mm", radius_edges_mm)
     if edges.ndim != 1 or len(edges) < 2 or not edges[0] >= 0 or not np.all(np.diff(edges) > 0):
-        raise InputError(f"radius_edges_mm = {radius_edges_mm!r}: at least two ascending radii of 0 or more are needed")
-    solver = _solver(method)
-    if not hasattr(solver, "profile"):
-        raise InputError(f"method = {method!r}: gives no profile; use path-table")
-    return solver.profile(_layers(layers), edges, photons=photons, seed=seed, **options)
+        raise InputError(
+            f"radius_edges_mm = {shown(radius_edges_mm)}: at least two ascending radii of 0 or more are needed"
+        )
+    return _call(method, "profile", layers, edges, photons=photons, seed=seed, options=options)
 
 
 def spectrum(skin: Skin, wavelength_nm=None, method: str = "adding-doubling", **options) -> np.ndarray:
@@ -83,7 +91,13 @@ def spectrum_with_error(skin: Skin, wavelength_nm=None, method: str = "adding-do
 
 
 def _each(skin: Skin, wavelength_nm, method: str, options: dict) -> list:
-    nm = np.arange(380.0, 781.0, 5.0) if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, float))
+    nm = (
+        np.arange(380.0, 781.0, 5.0)
+        if wavelength_nm is None
+        else np.atleast_1d(numbers("wavelength_nm", wavelength_nm))
+    )
+    if nm.ndim != 1:
+        raise InputError(f"wavelength_nm has shape {nm.shape}: one wavelength or a list of them is needed")
     return [reflectance(layers(skin, float(w)), method, **options, wavelength_nm=float(w)) for w in nm]
 
 

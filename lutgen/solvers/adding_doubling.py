@@ -13,12 +13,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from lutgen.errors import InputError
+from lutgen.errors import InputError, whole
 from lutgen.solvers.result import Reflectance
 from lutgen.tissue import Layer
 
 NODES = 16
 """Quadrature nodes in each interval between critical cosines: within 1e-6 of 32 nodes on skin (12: 1e-6, 8: 1e-4)."""
+OPTIONS = ("nodes", "wavelength_nm")
 _SERIES_ORDER = 8
 _MAX_DOUBLINGS = 90
 _TOTAL = 1 - 1e-15  # total reflection: exactly 1 is singular in a lossless layer between two rarer ones
@@ -259,7 +260,6 @@ def reflectance(
     layers: list[Layer], photons: int = 0, seed: int = 0, nodes: int = NODES, wavelength_nm: float = 0.0
 ) -> Reflectance:
     """Exact shares of a stack; photons, seed and wavelength do not matter. `nodes` per interval of directions."""
-    if isinstance(nodes, bool) or not isinstance(nodes, int) or not 4 <= nodes <= 64:
-        raise InputError(f"nodes = {nodes!r}: allowed is a whole number 4 to 64")
+    whole("nodes", nodes, 4, 64)
     diffuse, specular, transmitted, _ = stack(layers, nodes=nodes)
     return Reflectance(diffuse, specular, transmitted)

@@ -23,6 +23,7 @@ from lutgen.tissue import Layer
 
 ABSORPTION = ("albedo", "continuous", "mixed")
 THRESHOLD, SURVIVORS = 1e-4, 10.0
+OPTIONS = ("absorption", "threshold", "survivors", "device", "wavelength_nm")
 BLOCK_PHOTONS = 512
 MAX_LAYERS = 32
 _SMALL_G = 0.1  # below, half_inverse_g = 0 picks the form of the phase function that does not divide by g
@@ -127,10 +128,10 @@ def _check(layers: list[Layer]) -> None:
     if any(np.isinf(layer.thickness_mm) for layer in layers[:-1]):
         raise InputError("thickness_mm = inf: only the last layer may be semi-infinite")
     last = layers[-1]
-    if np.isinf(last.thickness_mm) and last.mu_s_per_mm > 0 and last.mu_a_per_mm < 1e-5 * last.mu_s_per_mm:
+    if np.isinf(last.thickness_mm) and last.mu_a_per_mm <= 1e-5 * last.mu_s_per_mm:
         raise InputError(
             f"mu_a_per_mm = {last.mu_a_per_mm:g} in a semi-infinite layer: a walk without absorption does not end; "
-            f"method direct needs at least {1e-5 * last.mu_s_per_mm:g} here, method adding-doubling any value"
+            f"method direct needs more than {1e-5 * last.mu_s_per_mm:g} here, method adding-doubling any value"
         )
 
 

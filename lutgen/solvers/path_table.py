@@ -20,10 +20,12 @@ from lutgen.profiles import Profile
 from lutgen.solvers.result import Reflectance
 from lutgen.tissue import Layer
 
-BLOCK_PHOTONS = 2048
+OPTIONS = ("device", "wavelength_nm")
+BLOCK_PHOTONS = {"cpu": 2048, "gpu": 128}
+"""Photons that one work-item walks in turn: a CPU wants few long items, a GPU tens of thousands of short ones."""
 NODES_E, NODES_D = 16, 16  # multiples of the widest lanes; totals err by 5e-6 (14 nodes: 3e-5, 20: 2e-7)
 MAX_STEPS_PER_LIFE = 1e6
-_BLOCKS_PER_LAUNCH = (64, 1024)
+_BLOCKS_PER_LAUNCH = {"cpu": (64, 1024), "gpu": (4096, 32_768)}
 _EVENTS_PER_LAUNCH = 5e8
 _ROWS = 64
 _FIXED_POINT = 2.0**30
@@ -62,39 +64,46 @@ class Tally:
     of: int = 0
 
 
+def block_photons(device: ocl.Device) -> int:
+    """Photons per block on that device; part of what random streams are keyed by."""
+    return BLOCK_PHOTONS["gpu" if device.kind == "gpu" else "cpu"]
+
+
 def walk_kernel(device: ocl.Device):
     """The built kernel of kernels/path_table.cl."""
     text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "path_table")
-    return ocl.kernel(device, "walk", text, {"W": device.lanes, "BLOCK_PHOTONS": BLOCK_PHOTONS})
+    return ocl.kernel(device, "walk", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device)})
 
 
 def tabulate_kernel(device: ocl.Device, rings: int, slices: int):
     """The built kernel of kernels/tabulate.cl."""
     text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "tabulate")
     sizes = {"NODES_E": NODES_E, "NODES_D": NODES_D, "RINGS": rings, "SLICES": slices}
-    return ocl.kernel(device, "tabulate", text, {"W": device.lanes, "BLOCK_PHOTONS": BLOCK_PHOTONS, **sizes})
+    return ocl.kernel(device, "tabulate", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device), **sizes})
 
 
 def kernel_hash(device: ocl.Device) -> str:
     """Short hash of everything the trace's numbers depend on: kernel text, structs, lanes and block size."""
     text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "path_table", "tabulate")
-    return hashlib.sha256(f"{device.lanes} {BLOCK_PHOTONS} {NODES_E} {NODES_D} {text}".encode()).hexdigest()[:16]
+    return hashlib.sha256(f"{device.lanes} {block_photons(device)} {NODES_E} {NODES_D} {text}".encode()).hexdigest()[
+        :16
+    ]
 
 
-def _jobs(medium: Medium, photons: int, seed: int) -> np.ndarray:
+def _jobs(medium: Medium, photons: int, seed: int, block: int) -> np.ndarray:
     """One job per block, ordered by wavelength, then block."""
-    K, blocks = len(medium.wavelength_nm), -(-photons // BLOCK_PHOTONS)
+    K, blocks = len(medium.wavelength_nm), -(-photons // block)
     jobs = np.zeros((K, blocks), JOB)
     for field, values in (("mu_s", medium.mu_s_per_mm), ("g", medium.g), ("nu", medium.nu_per_mm)):
         jobs[field] = np.asarray(values)[:, None]
     jobs["n"], jobs["epidermis_mm"], jobs["seed"] = medium.n, medium.epidermis_mm, seed
     jobs["wavelength"] = np.rint(np.asarray(medium.wavelength_nm) * 1000).astype("u4")[:, None]
     jobs["block"] = np.arange(blocks)
-    jobs["photons"] = BLOCK_PHOTONS
-    jobs["photons"][:, -1] = photons - (blocks - 1) * BLOCK_PHOTONS
-    # A life is under 17 / nu; the sum of a block's lives never comes near 4 times its mean plus such a life.
-    per_life = medium.mu_s_per_mm / medium.nu_per_mm
-    jobs["max_steps"] = np.minimum(per_life * (4 * BLOCK_PHOTONS + 64), 4e9).astype("u4")[:, None]
+    jobs["photons"] = block
+    jobs["photons"][:, -1] = photons - (blocks - 1) * block
+    # A life is under 22 / nu; the sum of a block's lives never comes near 4 times its mean plus such a life.
+    per_life = medium.mu_s_per_mm / medium.nu_per_mm + 1  # the step that outlives it counts too
+    jobs["max_steps"] = np.minimum(per_life * (4 * block + 64), 4e9).astype("u4")[:, None]
     return jobs.ravel()
 
 
@@ -104,6 +113,7 @@ def _launches(
     """Walk all blocks; yield jobs, results, and the device buffers of bank and results after each launch."""
     whole("photons", photons, *PHOTONS)
     whole("seed", seed, *SEEDS)
+    in_range("mu_s_per_mm", float(np.min(medium.mu_s_per_mm)), 1e-6, 1e6, " for path-table")
     steps_per_life = float(np.max(medium.mu_s_per_mm / np.maximum(medium.nu_per_mm, 1e-30)))
     if steps_per_life > MAX_STEPS_PER_LIFE:
         least = float(np.max(medium.mu_s_per_mm)) / MAX_STEPS_PER_LIFE
@@ -111,12 +121,16 @@ def _launches(
             f"mu_a_per_mm = {float(np.min(medium.nu_per_mm)):g}: a walk without absorption does not end; path-table "
             f"needs at least {least:.3g} /mm here, method adding-doubling any value"
         )
-    jobs = _jobs(medium, photons, seed)
-    low, high = _BLOCKS_PER_LAUNCH
-    size = blocks_per_launch or int(np.clip(_EVENTS_PER_LAUNCH / (BLOCK_PHOTONS * steps_per_life), low, high))
+    block = block_photons(device)
+    jobs = _jobs(medium, photons, seed, block)
+    low, high = _BLOCKS_PER_LAUNCH["gpu" if device.kind == "gpu" else "cpu"]
+    if blocks_per_launch is not None:
+        whole("blocks_per_launch", blocks_per_launch, 1, 2**20)
+    fit = _EVENTS_PER_LAUNCH / (block * (steps_per_life + 1))
+    size = blocks_per_launch or int(np.clip(fit, low, high))
     size = min(size, len(jobs))
     walk = walk_kernel(device)
-    bank = ocl.buffer(device, 12 * BLOCK_PHOTONS * size)
+    bank = ocl.buffer(device, 12 * block * size)
     tally.of = photons * len(medium.wavelength_nm)
     for start in range(0, len(jobs), size):
         part = jobs[start : start + size]
@@ -144,7 +158,7 @@ def records(
     device = device or ocl.choose()
     key = {round(nm * 1000): k for k, nm in enumerate(medium.wavelength_nm)}
     for jobs, results, bank, _ in _launches(medium, photons, seed, device, None, tally or Tally()):
-        exits = ocl.read(device, bank, np.empty((len(jobs), BLOCK_PHOTONS, 3), "f4"))
+        exits = ocl.read(device, bank, np.empty((len(jobs), block_photons(device), 3), "f4"))
         for job, result, rows in zip(jobs, results, exits, strict=True):
             yield key[int(job["wavelength"])], rows[: result["escaped"]]
 
@@ -208,7 +222,7 @@ def medium_of(layers: list[Layer], wavelength_nm: float = 0.0) -> Medium:
         a, b = getattr(top, name), getattr(bottom, name)
         if a != b:
             raise InputError(f"{name} = {a:g} and {b:g}: path-table needs the same in both layers; {method}")
-    in_range("mu_s_per_mm", top.mu_s_per_mm, 1e-6, 1e6, " /mm for path-table")
+    in_range("wavelength_nm", wavelength_nm, 0, 1e6)
     thickness = top.thickness_mm if len(layers) == 2 else 0.0
     nu = min(layer.mu_a_per_mm for layer in layers if layer.thickness_mm > 0)
     one = [np.array([v], float) for v in (wavelength_nm, top.mu_s_per_mm, top.g, nu)]
