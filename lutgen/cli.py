@@ -64,9 +64,13 @@ def _parser() -> argparse.ArgumentParser:
     bench = commands.add_parser("bench", help="speed of the trace, and time and error of a bake by stage")
     bench.set_defaults(run="lutgen.commands.bench")
 
+    figures = commands.add_parser("figures", help="the source document's results as charts and tables")
+    figures.add_argument("--out", required=True, metavar="DIR", help="folder to make")
+    figures.set_defaults(run="lutgen.commands.figures")
+
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, info, devices, check, bench):
+    for command in (bake, swatch, info, devices, check, bench, figures):
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

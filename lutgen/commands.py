@@ -215,3 +215,14 @@ def bench(options: Namespace) -> Outcome:
         + f"\nexpansion to another oxygenation: {1000 * result['expand_s']:.1f} ms"
     )
     return result, text, 0
+
+
+def figures(options: Namespace) -> Outcome:
+    """`lutgen figures`: the source document's results, and what they are compared with, as charts and tables."""
+    from lutgen import figures as drawing
+
+    out = Path(options.out)
+    with _Progress(quiet=options.json) as progress:
+        shown = drawing.draw(out, progress=progress)
+    text = f"{out.absolute()}\n" + "\n".join(f"{name}: {words}" for name, words in shown.items())
+    return {"out": str(out.absolute()), "figures": shown}, text, 0

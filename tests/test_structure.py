@@ -1,6 +1,7 @@
 """The layout: imports point down, the wheel's only top-level name is lutgen, no heavy import on a light path."""
 
 import ast
+import re
 import shutil
 import subprocess
 import sys
@@ -14,16 +15,21 @@ import lutgen
 ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"cli"},
-    {"commands", "benchmark", "checking", "figures", "comparisons", "charting"},
+    {"commands", "benchmark", "checking"},
+    {"figures"},
+    {"comparisons"},
     {"baking"},
+    {"spectra"},
     {"solvers"},
-    {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
+    {"manifest", "preview", "paper", "charting", "device", "exr", "lutset", "expansion"},
     {"config", "paths", "profiles", "quadrature", "burley"},
     {"axes", "tissue", "color"},
     {"chromophores"},
     {"errors"},
 ]
-HEAVY = {"pyopencl": {"device"}, "OpenEXR": {"exr"}, "colour": {"data"}, "scipy": {"data"}, "moderngl": set()}
+HEAVY = {
+    "pyopencl": {"device"}, "OpenEXR": {"exr"}, "colour": {"data"}, "scipy": {"data"}, "matplotlib": {"charting"},
+}  # fmt: skip
 
 
 def modules():
@@ -132,3 +138,11 @@ def test_no_lock_file_and_no_path_of_a_machine():
     assert {t for t in tops if not t.startswith(".")} <= {
         "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "lutgen", "kernels", "viewer", "luts", "tests",
     }  # fmt: skip
+
+
+def test_the_readme_has_no_gap_and_its_pictures_exist():
+    text = (ROOT / "README.md").read_text()
+    assert "@@" not in text
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", text)
+    assert pictures
+    assert all((ROOT / picture).is_file() for picture in pictures)

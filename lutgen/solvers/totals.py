@@ -1,8 +1,8 @@
 """Exact diffuse reflectance of one kind of two-layer skin at any wavelength and absorption, fast enough for a bake.
 
 Reflectance is smooth in wavelength (through scattering alone) and in the cube roots of both absorptions, so a table
-at Chebyshev nodes of all three, filled by adding-doubling, stands for every spectrum. Measured over the whole allowed range
-with 10 x 24 x 24 nodes: within 3e-6 of the solver at an epidermis of 0.1 mm, 1e-5 at 0.5 mm.
+at Chebyshev nodes of all three, filled by adding-doubling, stands for every spectrum. Measured over the whole
+allowed range with 10 x 24 x 24 nodes: within 3e-6 of the solver at an epidermis of 0.1 mm, 1e-5 at 0.5 mm.
 """
 
 from __future__ import annotations
