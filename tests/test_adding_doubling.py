@@ -96,7 +96,7 @@ def test_nodes_converge_without_drift():
     row = next(r for r in TWO_LAYER if r["reading"] == "A")
     values = [diffuse(two_layers(row), nodes=n) for n in (12, 16, 24, 32, 48, 64)]
     assert np.ptp(values[1:]) < 2e-6
-    assert abs(values[0] - values[-1]) < 1e-5
+    assert abs(values[0] - values[-1]) < 3e-6  # one moment per direction instead of 1.5 errs by 7e-6
 
 
 def test_two_layer_grid_is_the_stack():

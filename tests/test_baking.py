@@ -101,6 +101,37 @@ def test_extra_absorbers_are_baked_in(draft):
     assert more.color(0.02, 0.7, 0.01).sum() < draft.color(0.02, 0.7, 0.01).sum()
 
 
+def test_a_second_expansion_keeps_what_the_first_one_added(draft):
+    once = draft.expand(extra_absorbers={"dermis": 0.05})
+    assert np.abs(once.expand().color_lut.acescg - once.color_lut.acescg).max() < 1e-12
+    again = once.expand(oxygenation=0.5)
+    both = draft.expand(oxygenation=0.5, extra_absorbers={"dermis": 0.05})
+    assert np.abs(again.color_lut.acescg - both.color_lut.acescg).max() < 1e-12
+    assert np.abs(again.expand(extra_absorbers={}).color_lut.acescg - draft.expand(0.5).color_lut.acescg).max() < 1e-12
+
+
+def test_color_sigma_is_right():
+    """Scatter of 24 small bakes against the sigma they state, 3 channels: within 4/sqrt(2 * 24)."""
+    sets = [lutgen.bake({"photons": 4096, "seed": seed}) for seed in range(24)]
+    values = np.array([luts.totals.evaluate(*_coefficients(luts))[:, 0, 0] @ luts.weights for luts in sets])
+    stated = np.array([luts.color_std_error(0.1, 0.7, 0.02)[0] for luts in sets]).mean(axis=0)
+    assert np.all(np.abs(values.std(axis=0, ddof=1) / stated - 1) < 4 / np.sqrt(2 * 24))
+
+
+def _coefficients(luts):
+    skin = (np.array([v]) for v in (0.1, 0.7, 0.02))
+    return expansion.coefficients(luts.paths.wavelength_nm, luts.absorbers, *skin)
+
+
+def test_measured_error_sees_wrong_colors_and_shapes(draft):
+    exact = totals.exact_totals(SKIN)
+    pale = replace(draft, color_lut=replace(draft.color_lut, acescg=draft.color_lut.acescg * 1.1))
+    assert baking.measure(pale, exact)["color"]["delta_e00_max"] > 1.5
+    shifted = np.roll(draft.profile_lut.shape, 3, axis=-2)
+    wide = replace(draft, profile_lut=replace(draft.profile_lut, shape=shifted))
+    assert baking.measure(wide, exact)["profile"]["ee_difference_max"] > 0.05
+
+
 def test_expansion_beyond_the_paths_is_refused(draft):
     with pytest.raises(lutgen.InputError, match=r"dermis absorption = .* the stored paths cover"):
         draft.expand(extra_absorbers={"dermis": 1000.0})

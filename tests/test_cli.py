@@ -93,6 +93,37 @@ def test_swatch_prints_color_and_json(capsys, tmp_path):
     assert wanted in {rgb for _, rgb in picture.getcolors(1 << 24) or []}
 
 
+def test_swatch_takes_every_setting(capsys):
+    def swatch(*more):
+        status, text, _ = run(capsys, "swatch", "--preset", "tan", "--json", *more)
+        assert status == 0
+        return json.loads(text)
+
+    plain, seeded = swatch(), ["--method", "path-table", "--photons", 2048, "--seed"]
+    assert swatch(*seeded, 1)["reflectance"] != swatch(*seeded, 2)["reflectance"]
+    for more in (
+        ["--reading", "literal"],
+        ["--scattering", "jacques"],
+        ["--oxygenation", 0.2],
+        ["--epidermis-mm", 0.25],
+    ):
+        assert np.abs(np.subtract(swatch(*more)["reflectance"], plain["reflectance"])).max() > 1e-3
+    source = swatch("--pipeline", "source")
+    expected = lutgen.linear_srgb(lutgen.preset("tan"), pipeline="source")
+    assert source["linear_srgb"] == pytest.approx(expected.tolist(), abs=1e-12)
+    assert source["linear_srgb"] != plain["linear_srgb"]
+
+
+def test_an_interrupt_is_one_line_status_130(capsys, monkeypatch):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lutgen.commands.devices", interrupted)
+    status, _, err = run(capsys, "devices")
+    assert status == 130
+    assert err.count("\n") == 1
+
+
 @pytest.mark.parametrize("method", ["path-table", "direct"])
 def test_swatch_by_monte_carlo_agrees_with_its_sigma(capsys, method):
     status, text, _ = run(capsys, "swatch", "--preset", "tan", "--method", method, "--photons", 8192, "--json")
@@ -161,7 +192,8 @@ def test_bad_input_is_one_line_status_2_and_nothing_written(capsys, tmp_path, mo
     assert not list(tmp_path.iterdir())
 
 
-def test_existing_folder_is_refused_before_any_work(capsys, tmp_path):
+def test_existing_folder_is_refused_before_any_work(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("lutgen.baking.bake", None)  # calling it would fail otherwise
     status, _, err = run(capsys, "bake", "--out", tmp_path)
     assert status == 2
     assert "exists" in err
@@ -227,6 +259,26 @@ def test_a_terminal_without_the_signs_still_gets_its_lines(tmp_path):
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
     assert "E00 max" in done.stdout
+
+
+@pytest.mark.parametrize("harm", ["nan", "sums", "clamped"])
+def test_check_names_the_law_that_a_profile_breaks(draft, draft_dir, tmp_path, harm):
+    folder = tmp_path / "set"
+    shutil.copytree(draft_dir, folder)
+    shape, clamped = draft.profile_lut.shape.copy(), draft.profile_lut.clamped_share.copy()
+    if harm == "nan":
+        shape[0, 0, 0, 5, 1] = np.nan
+    elif harm == "sums":
+        shape[1, 1, 1] *= 1.01
+    else:
+        clamped[0, 0, 0, 2] = 0.02
+    harmed = replace(draft, profile_lut=replace(draft.profile_lut, shape=shape, clamped_share=clamped))
+    manifest.exr.write(folder / "profile.exr", manifest._parts(harmed)["profile.exr"])
+    facts = json.loads((folder / "manifest.json").read_text())
+    facts["files"]["profile.exr"] = hashlib.sha256((folder / "profile.exr").read_bytes()).hexdigest()
+    (folder / "manifest.json").write_text(json.dumps(facts))
+    failed = {finding.name for finding in checking.check(folder) if not finding.passed}
+    assert {"nan": "profile values", "sums": "profile sums", "clamped": "clamped share"}[harm] in failed
 
 
 @pytest.mark.parametrize("harm", ["node", "rise", "nan", "preview", "no preview"])

@@ -88,6 +88,14 @@ def test_linear_srgb_is_unclipped_and_in_the_pipeline_asked_for():
     assert red.min() < 0
 
 
+def test_acescg_goes_back_by_the_pipelines_own_matrix():
+    xyz = np.random.default_rng(3).random((20, 3))
+    for pipeline in color.PIPELINES:
+        for space in color.SPACES:
+            found = color.from_acescg(color.from_xyz(xyz, "acescg"), space, pipeline)
+            assert np.abs(found - color.from_xyz(xyz, space, pipeline)).max() < 1e-12
+
+
 def test_measured_presets_have_the_lightness_order_of_their_names():
     lightness = [float(color.lab(color.spectrum_to_xyz(lutgen.spectrum(skin)))[0]) for skin in lutgen.PRESETS.values()][
         :6

@@ -41,6 +41,7 @@ def test_files_are_laid_out_as_the_manifest_says(draft, draft_dir):
     assert strip.shape == (N_h, N_e * N_m, 3)
     assert strip.dtype == np.float32
     assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    assert header["chromaticities"] == pytest.approx((0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767))
     for h, e, m in ((0, 0, 0), (5, 2, 7), (N_h - 1, N_e - 1, N_m - 1)):
         assert np.array_equal(strip[h, e * N_m + m], draft.color_lut.acescg[h, e, m].astype("f4"))
     parts = exr.read(draft_dir / "profile.exr")
@@ -99,6 +100,44 @@ def test_a_killed_replacement_gives_the_old_set_back(draft_dir, tmp_path):
     with pytest.raises(lutgen.InputError, match="exists"):
         manifest.check_target(tmp_path / "set", force=False)
     manifest.load(tmp_path / "set")
+
+
+def test_what_a_living_process_writes_is_left_alone(draft, tmp_path):
+    busy = tmp_path / f".set.partial-{os.getppid()}-00000000"
+    busy.mkdir()
+    manifest.save(draft, tmp_path / "set")
+    assert busy.exists()
+
+
+def test_a_failed_replacement_gives_the_old_set_back(draft, draft_dir, tmp_path, monkeypatch):
+    out = tmp_path / "set"
+    shutil.copytree(draft_dir, out)
+    rename = type(out).rename
+
+    def fails(path, target):
+        if "partial" in path.name:
+            raise OSError(errno.EIO, "Input/output error")
+        return rename(path, target)
+
+    monkeypatch.setattr(type(out), "rename", fails)
+    with pytest.raises(lutgen.InputError, match="cannot be written"):
+        manifest.save(draft, out, force=True)
+    monkeypatch.undo()
+    manifest.load(out)
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+def test_every_file_is_synced_before_the_folder_takes_its_name(draft, tmp_path, monkeypatch):
+    synced, sync = [], manifest._sync
+
+    def record(path):
+        synced.append(path.name)
+        assert (tmp_path / "set").exists() == (path == tmp_path)
+        sync(path)
+
+    monkeypatch.setattr(manifest, "_sync", record)
+    manifest.save(draft, tmp_path / "set")
+    assert {*manifest.FILES, "manifest.json", tmp_path.name} <= set(synced)
 
 
 def test_force_does_not_replace_what_is_no_set(draft, tmp_path):

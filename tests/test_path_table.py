@@ -79,14 +79,17 @@ def test_laplace_table_is_the_bank():
     table = path_table.trace(medium, *reach, EDGES, 32_768, 3)
     skins = baking.random_skins(default_grid(2, 2, 2), 40, 4)
     mu = expansion.coefficients(NM, expansion.absorbers(NM, 0.4), *skins)
-    direct = np.zeros((len(NM), len(EDGES) - 1, 40))
+    direct, square = np.zeros((len(NM), len(EDGES) - 1, 40)), np.zeros((len(NM), 40))
     for k, rows in path_table.records(medium, 32_768, 3):
         radius, path, in_e = rows.astype(float).T
         ring = np.searchsorted(EDGES[1:-1], radius, side="right")
         for p in range(40):
             rate = (mu[0][k, p] - medium.nu_per_mm[k]) * in_e + (mu[1][k, p] - medium.nu_per_mm[k]) * (path - in_e)
             direct[k, :, p] += np.bincount(ring, np.exp(-rate), len(EDGES) - 1)
+            square[k, p] += np.exp(-2 * rate).sum()
     direct *= medium.entry / 32_768
+    sigma = np.sqrt((medium.entry**2 * square / 32_768 - direct.sum(axis=1) ** 2) / 32_768)
+    assert np.abs(table.totals().std_error(*mu)[:, 0] / sigma - 1).max() < 1e-3
     found = table.evaluate(*mu)
     assert np.abs(found.sum(axis=1) - direct.sum(axis=1)).max() < 2e-5
     assert np.abs(found - direct).max() < 5e-6
@@ -107,6 +110,35 @@ def test_any_split_into_launches_gives_the_same_bytes():
     whole, *split = [trace(photons, blocks_per_launch=size) for size in (12, 6, 2, 5, 1)]
     for table in split:
         assert table.energy.tobytes() == whole.energy.tobytes()
+
+
+@pytest.mark.parametrize("block", [1, 3])
+def test_blocks_smaller_than_the_lanes_are_unbiased(block, monkeypatch):
+    """Lanes without a photon stay idle: 20,000 photons in blocks of 1 or 3 reflect what they should."""
+    monkeypatch.setitem(path_table.BLOCK_PHOTONS, "cpu", block)
+    layers = [Layer(np.inf, 1.0, 30, 0.78, 1.4)]
+    found = lutgen.reflectance(layers, method="path-table", photons=20_000, seed=6)
+    assert abs(found.diffuse - lutgen.reflectance(layers).diffuse) < 4 * found.std_error
+
+
+def test_profile_sums_to_the_reflectance():
+    layers = lutgen.layers(SKIN, 600)
+    one = lutgen.profile(layers, [0, 1, 1e3], photons=20_000, seed=3)
+    two = lutgen.reflectance(layers, method="path-table", photons=20_000, seed=3)
+    assert float(one.total) == pytest.approx(two.diffuse, rel=1e-12)
+
+
+def test_lives_end_at_the_least_absorption_of_any_allowed_skin():
+    medium, (epidermis, dermis) = baking.skin_medium(SKIN, NM)
+    assert medium.nu_per_mm == pytest.approx(np.minimum(epidermis[0], dermis[0]), rel=1e-12)
+
+
+def test_kernel_hash_names_text_and_lanes(monkeypatch):
+    device = ocl.choose()
+    hashes = {path_table.kernel_hash(device), path_table.kernel_hash(replace(device, lanes=1))}
+    source = ocl.source
+    monkeypatch.setattr(ocl, "source", lambda *names: source(*names) + "// changed")
+    assert len(hashes | {path_table.kernel_hash(device)}) == 3
 
 
 def test_photons_need_not_fill_blocks():
