@@ -44,7 +44,9 @@ def _parser() -> argparse.ArgumentParser:
     swatch.add_argument("--saidi-b-nm4-per-mm", type=float, help="Saidi's fitted B (default: 8.4e10)")
     swatch.add_argument("--reading", help="reduced, similarity or literal")
     swatch.add_argument("--pipeline", default="default", help="default or source")
-    swatch.add_argument("--method", default="adding-doubling", help="adding-doubling, path-table or direct")
+    swatch.add_argument(
+        "--method", default="adding-doubling", help="adding-doubling, path-table, direct, dipole or multipole"
+    )
     swatch.add_argument("--photons", type=int, default=100_000, help="per wavelength, for Monte Carlo")
     swatch.add_argument("--seed", type=int, default=0)
     swatch.add_argument("--png", metavar="FILE", help="write a picture of the color")

@@ -136,15 +136,15 @@ def test_bad_stacks_are_refused():
         ),
         (lambda: lutgen.reflectance(None), "a list of at least one"),
         (lambda: lutgen.reflectance([inf], photons=-5), "photons = -5"),
-        (lambda: lutgen.spectrum("light"), "skin = 'light': a lutgen.Skin is needed"),
+        (lambda: lutgen.spectrum("light"), "skin = 'light': a lutgen.Skin is needed"),  # type: ignore[arg-type]
         (lambda: lutgen.spectrum(lutgen.preset("light"), "abc"), "wavelength_nm = 'abc'"),
         (lambda: lutgen.spectrum(lutgen.preset("light"), [[550.0]]), "has shape"),
         (lambda: lutgen.spectrum(lutgen.preset("light"), 900), "wavelength_nm = 900: allowed is 380 to 780"),
         (lambda: lutgen.profile([inf], "abc"), "radius_edges_mm = 'abc'"),
         (lambda: lutgen.profile([inf], [2, 1]), "ascending radii"),
-        (lambda: lutgen.Layer("a", 1, 1, 1), "thickness_mm = 'a': a number"),
-        (lambda: lutgen.Skin(np.array([0.1, 0.2]), 0.7, 0.01), "melanin = array"),
-        (lambda: lutgen.load([1]), "the folder of a LUT set"),
+        (lambda: lutgen.Layer("a", 1, 1, 1), "thickness_mm = 'a': a number"),  # type: ignore[arg-type]
+        (lambda: lutgen.Skin(np.array([0.1, 0.2]), 0.7, 0.01), "melanin = array"),  # type: ignore[arg-type]
+        (lambda: lutgen.load([1]), "the folder of a LUT set"),  # type: ignore[arg-type]
     ):
         with pytest.raises(lutgen.InputError, match=message):
             call()

@@ -12,7 +12,13 @@ from lutgen.paths import PHOTONS, SEEDS
 from lutgen.profiles import Profile, default_edges
 from lutgen.tissue import Layer, Skin, layers
 
-METHODS = {"path-table": "path_table", "adding-doubling": "adding_doubling", "direct": "direct"}
+METHODS = {
+    "path-table": "path_table",
+    "adding-doubling": "adding_doubling",
+    "direct": "direct",
+    "dipole": "dipole",
+    "multipole": "multipole",
+}
 """Method name -> module of this package with `reflectance` and, where the method knows radii, `profile`."""
 
 
@@ -37,8 +43,8 @@ def reflectance(layers, method: str = "adding-doubling", photons: int = 100_000,
     """Diffuse, specular and transmitted share of light along the normal, with the diffuse share's standard error.
 
     `layers`: Layers from the surface down. `photons` and `seed` matter to Monte Carlo only. Options: `device` of
-    path-table and direct, `nodes` of adding-doubling, `absorption`, `threshold`, `survivors` of direct. Raises
-    InputError for stacks that the method cannot represent.
+    path-table and direct, `nodes` of adding-doubling, `absorption`, `threshold`, `survivors` of direct, `unsafe` of
+    dipole and multipole. Raises InputError for stacks that the method cannot represent or must not be trusted with.
 
     >>> import lutgen
     >>> result = lutgen.reflectance(lutgen.layers(lutgen.preset("light"), 550))
