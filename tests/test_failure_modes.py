@@ -155,6 +155,9 @@ def test_ending_photons_by_their_life_is_unbiased():
 def test_zero_thickness_and_clear_top_layers():
     below = Layer(np.inf, 0.3, 20, 0.8, 1.4)
     plain = lutgen.reflectance([below]).diffuse
+    vanishing = Layer(1e-200, 1e-200, 20, 0.8, 1.4)  # its optical thickness is no float
+    assert lutgen.reflectance([vanishing, below]).diffuse == pytest.approx(plain, abs=1e-12)
+    assert lutgen.reflectance([Layer(1e-200, 1e-200, 1e-200, 0, 1.0)]).transmitted == pytest.approx(1, abs=1e-12)
     assert lutgen.reflectance([Layer(0, 9, 20, 0.8, 1.4), below]).diffuse == pytest.approx(plain, abs=1e-12)
     assert lutgen.reflectance([Layer(1, 0, 0, 0, 1.4), below]).diffuse == pytest.approx(plain, abs=1e-9)
     assert 0 < lutgen.reflectance([Layer(1, 0, 0, 0, 1.5), below]).diffuse < 1  # a glass plate, guided light and all

@@ -117,7 +117,7 @@ def layer_matrices(
     B = opposite * gain
     steepest = float(np.max(mu_a + mu_s_scaled)) / cosine.min()
     semi_infinite = np.isinf(thickness_mm)
-    doublings = 0 if semi_infinite else max(0, int(np.ceil(np.log2(thickness_mm * steepest / 0.25))))
+    doublings = 0 if semi_infinite else int(np.ceil(np.log2(max(thickness_mm * steepest / 0.25, 1.0))))
     thin = 0.25 / steepest if semi_infinite else thickness_mm / 2**doublings
     R, T = _thin_slab(A, B, thin)
     for _ in range(_MAX_DOUBLINGS if semi_infinite else doublings):
