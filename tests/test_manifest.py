@@ -302,3 +302,19 @@ def test_killed_at_any_moment_a_set_is_whole_or_absent(tmp_path):
         assert {path.name for path in folder.iterdir()} <= {"set"}
     assert whole
     assert absent
+
+
+def test_a_killed_bake_leaves_nothing_or_a_whole_set(tmp_path):
+    """The command itself, killed at moments from its imports to after its end, into the same folder each time."""
+    out = tmp_path / "set"
+    command = [sys.executable, "-m", "lutgen.cli", "bake", "--quality", "draft", "--force", "--out", str(out)]
+    for delay in np.linspace(0.05, 1.6, 8):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(float(delay))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        if out.exists():
+            manifest.load(out)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    manifest.load(out)
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
