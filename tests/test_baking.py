@@ -110,19 +110,6 @@ def test_a_second_expansion_keeps_what_the_first_one_added(draft):
     assert np.abs(again.expand(extra_absorbers={}).color_lut.acescg - draft.expand(0.5).color_lut.acescg).max() < 1e-12
 
 
-def test_color_sigma_is_right():
-    """Scatter of 24 small bakes against the sigma they state, 3 channels: within 4/sqrt(2 * 24)."""
-    sets = [lutgen.bake({"photons": 4096, "seed": seed}) for seed in range(24)]
-    values = np.array([luts.totals.evaluate(*_coefficients(luts))[:, 0, 0] @ luts.weights for luts in sets])
-    stated = np.array([luts.color_std_error(0.1, 0.7, 0.02)[0] for luts in sets]).mean(axis=0)
-    assert np.all(np.abs(values.std(axis=0, ddof=1) / stated - 1) < 4 / np.sqrt(2 * 24))
-
-
-def _coefficients(luts):
-    skin = (np.array([v]) for v in (0.1, 0.7, 0.02))
-    return expansion.coefficients(luts.paths.wavelength_nm, luts.absorbers, *skin)
-
-
 def test_measured_error_sees_wrong_colors_and_shapes(draft):
     exact = totals.exact_totals(SKIN)
     pale = replace(draft, color_lut=replace(draft.color_lut, acescg=draft.color_lut.acescg * 1.1))
