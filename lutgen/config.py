@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from lutgen import quadrature, tissue
-from lutgen.axes import Axis, Grid, default_grid
+from lutgen.axes import Grid, default_grid
 from lutgen.color import PIPELINES
 from lutgen.errors import InputError, one_of, shown, whole
 from lutgen.paths import PHOTONS, SEEDS
@@ -106,13 +106,9 @@ def from_dict(values: Mapping, base: Recipe | None = None) -> Recipe:
         for axis in axes:
             keys = _table(axis, axes, f"{name}.{axis}")
             _known(f"{name}.{axis}", keys, _AXIS_KEYS)
-            changed[axis] = _axis(getattr(grid, axis), keys)
+            changed[axis] = replace(getattr(grid, axis), **keys)
         changes[name] = replace(grid, **changed)
     return replace(base, **changes)
-
-
-def _axis(axis: Axis, keys: Mapping) -> Axis:
-    return replace(axis, **keys)
 
 
 def _table(name: str, values: Mapping, where: str | None = None) -> Mapping:

@@ -62,10 +62,6 @@ class PathTable:
     photons: int
     entry: float
 
-    def bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Least and greatest covered absorption of epidermis and dermis, 1/mm, each [K]."""
-        return tuple(f(mu) for mu in (self.mu_epidermis, self.mu_dermis) for f in (_low_end, _high_end))  # type: ignore[return-value]
-
     def totals(self) -> PathTable:
         """The same table with all rings joined into one."""
         edges = self.radius_edges_mm[[0, -1]]
