@@ -219,10 +219,10 @@ def bench(options: Namespace) -> Outcome:
 
 def figures(options: Namespace) -> Outcome:
     """`lutgen figures`: the source document's results, and what they are compared with, as charts and tables."""
-    from lutgen import figures as drawing
+    from lutgen.charts import figures as charts
 
     out = Path(options.out)
     with _Progress(quiet=options.json) as progress:
-        shown = drawing.draw(out, progress=progress)
+        shown = charts.draw(out, progress=progress)
     text = f"{out.absolute()}\n" + "\n".join(f"{name}: {words}" for name, words in shown.items())
     return {"out": str(out.absolute()), "figures": shown}, text, 0

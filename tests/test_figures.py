@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lutgen import charting, comparisons, figures, spectra
+from lutgen.charts import comparisons, drawing, figures, spectra
 from lutgen.errors import InputError, MachineError
 from lutgen.solvers import adding_doubling, direct
 from lutgen.tissue import PRESETS, Skin, layers, preset
@@ -140,14 +140,14 @@ def test_a_folder_with_something_in_it_is_refused(drawn, tmp_path):
         figures.draw(drawn, steps=3)
     assert sorted(drawn.iterdir()) == before
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(InputError, match="not an empty folder"), charting.folder(tmp_path / "file"):
+    with pytest.raises(InputError, match="not an empty folder"), drawing.folder(tmp_path / "file"):
         pass
-    with pytest.raises(InputError, match="make it first"), charting.folder(tmp_path / "no" / "such"):
+    with pytest.raises(InputError, match="make it first"), drawing.folder(tmp_path / "no" / "such"):
         pass
 
 
 def interrupted(out: Path) -> None:
-    with charting.folder(out) as folder:
+    with drawing.folder(out) as folder:
         (folder / "half").write_text("done")
         raise KeyboardInterrupt
 
@@ -158,7 +158,7 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
         interrupted(tmp_path / "out")
     assert not list(tmp_path.iterdir())
     (tmp_path / "out").mkdir()
-    with charting.folder(tmp_path / "out") as folder:
+    with drawing.folder(tmp_path / "out") as folder:
         (folder / "whole").write_text("done")
         assert not list((tmp_path / "out").iterdir())
     assert [path.name for path in tmp_path.rglob("*")] == ["out", "whole"]
@@ -175,9 +175,9 @@ def test_labels_move_apart_no_more_than_needed():
     random = np.random.default_rng(0)
     for count in (1, 2, 5, 9):
         places = random.uniform(0, 10, count)
-        moved = charting.apart(places, 1.0)
+        moved = drawing.apart(places, 1.0)
         assert np.array_equal(np.argsort(moved), np.argsort(places))
         assert (np.diff(np.sort(moved)) > 1 - 1e-9).all()
         assert moved.mean() == pytest.approx(places.mean())
     wide = np.array([3.0, 1.0, 9.0])
-    assert charting.apart(wide, 1.0).tolist() == wide.tolist()
+    assert drawing.apart(wide, 1.0).tolist() == wide.tolist()

@@ -16,19 +16,17 @@ ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"cli"},
     {"commands", "benchmark", "checking"},
-    {"figures"},
-    {"comparisons"},
+    {"charts"},
     {"baking"},
-    {"spectra"},
     {"solvers"},
-    {"manifest", "preview", "paper", "charting", "device", "exr", "lutset", "expansion"},
+    {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "paths", "profiles", "quadrature", "burley"},
     {"axes", "tissue", "color"},
     {"chromophores"},
     {"errors"},
 ]
 HEAVY = {
-    "pyopencl": {"device"}, "OpenEXR": {"exr"}, "colour": {"data"}, "scipy": {"data"}, "matplotlib": {"charting"},
+    "pyopencl": {"device"}, "OpenEXR": {"exr"}, "colour": {"data"}, "scipy": {"data"}, "matplotlib": {"charts"},
 }  # fmt: skip
 
 

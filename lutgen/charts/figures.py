@@ -8,9 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import charting, color, comparisons
-from lutgen.charting import DASHES, GRAY, HUES, inches
-from lutgen.spectra import ABSORPTIONS, SWEEPS, columns, nanometers, numbers, percent, shades, spectra, sweep, ticks
+from lutgen import color
+from lutgen.charts import comparisons, drawing
+from lutgen.charts.drawing import DASHES, GRAY, HUES, inches
+from lutgen.charts.spectra import (
+    ABSORPTIONS,
+    SWEEPS,
+    columns,
+    nanometers,
+    numbers,
+    percent,
+    shades,
+    spectra,
+    sweep,
+    ticks,
+)
 from lutgen.tissue import PRESETS
 
 STEPS = 24
@@ -36,7 +48,7 @@ def draw(out: Path, steps: int = STEPS, progress: Callable = lambda stage, tally
         "published": comparisons.published,
     }
     shown = {}
-    with charting.folder(out) as folder:
+    with drawing.folder(out) as folder:
         for name, stage in stages.items():
             progress(name, None)
             shown[name] = stage(folder)
@@ -57,13 +69,13 @@ def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
         "A sweep of the source document, from exact spectra. Linear absorption is right in the mean; the document's\n"
         "exponential absorption, with steps drawn from μt, comes out too bright."
     )
-    with charting.figure(9.8, 6.0, title, notes) as drawn:
+    with drawing.figure(9.8, 6.0, title, notes) as drawn:
         for i, (pipeline, heading) in enumerate(PIPELINE_NAMES.items()):
             top = 1.32 + 1.2 * i
             drawn.text(2.1 / 9.8, 1 - (top - 0.07) / 6.0, heading, color=GRAY)
             for j, a in enumerate(ABSORPTIONS):
                 words = ("linear (exact)", "exponential (biased)")[j]
-                charting.strip(inches(drawn, 2.1, top + 0.43 * j, 5.6, 0.43), looks[pipeline, a][0], words)
+                drawing.strip(inches(drawn, 2.1, top + 0.43 * j, 5.6, 0.43), looks[pipeline, a][0], words)
         lines = (
             (apart["source"], "linear to exponential,\nthe document's pipeline"),
             (apart["default"], "linear to exponential,\ndefault pipeline"),
@@ -77,7 +89,7 @@ def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
         axes.set_xticks(*ticks(parameter, steps))
         axes.grid(axis="y")
         labels = [(float(y[-1]), words, hue) for (y, words), hue in zip(lines, HUES, strict=False)]
-        charting.label_ends(axes, steps - 1, labels, 0.25 * top)
+        drawing.label_ends(axes, steps - 1, labels, 0.25 * top)
         off = {f"delta_e00_linear_to_exponential_{p}": apart[p] for p in PIPELINE_NAMES}
         off["delta_e00_between_pipelines_linear"] = between
         rows = [
@@ -85,7 +97,7 @@ def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
             for a in ABSORPTIONS
             for i, (skin, r) in enumerate(zip(skins, found[a], strict=True))
         ]
-        charting.save(drawn, folder, f"sweep-{parameter}", rows)
+        drawing.save(drawn, folder, f"sweep-{parameter}", rows)
     return f"linear to exponential absorption ΔE00 up to {np.max(list(apart.values())):.2f}; {_range(between)}"
 
 
@@ -98,7 +110,7 @@ def skin_types(folder: Path) -> str:
     skins = [PRESETS[f"source-{name.lower()}"] for name in TYPES]
     found = {a: spectra(skins, a) for a in ABSORPTIONS}
     off = np.zeros((3, 2))
-    with charting.figure(
+    with drawing.figure(
         12.4, 5.6, "The document's three skin types",
         "Left half of each patch: linear absorption (exact). Right half: the document's exponential one (biased).",
     ) as drawn:  # fmt: skip
@@ -110,7 +122,7 @@ def skin_types(folder: Path) -> str:
                 rgb, lab = zip(*(shades(found[a][i], pipeline) for a in ABSORPTIONS), strict=True)
                 off[i, j] = color.delta_e00(*lab)
                 axes = inches(drawn, left, 1.95 + 1.75 * j, 1.65, 1.15)
-                charting.strip(
+                drawing.strip(
                     axes, np.array(rgb), "" if i else PIPELINE_NAMES[pipeline].replace(" color ", "\ncolor\n")
                 )
                 for x, a in zip((0, 1), ABSORPTIONS, strict=True):
@@ -125,12 +137,12 @@ def skin_types(folder: Path) -> str:
         comparisons.dress_spectra(axes)
         axes.set_title("solid: linear · dashed: exponential", color=GRAY, size=9.5)
         labels = [(float(found["linear"][i][-1]), TYPES[i], HUES[i]) for i in range(3)]
-        charting.label_ends(axes, 780, labels, 0.12)
+        drawing.label_ends(axes, 780, labels, 0.12)
         rows = [
             {"skin": TYPES[i], **asdict(skins[i]), "absorption": a, **numbers(r), **columns(r)}
             for a in ABSORPTIONS for i, r in enumerate(found[a])
         ]  # fmt: skip
-        charting.save(drawn, folder, "skin-types", rows)
+        drawing.save(drawn, folder, "skin-types", rows)
     return "linear to exponential absorption ΔE00 " + ", ".join(
         f"{name} {row.max():.2f}" for name, row in zip(TYPES, off, strict=True)
     )

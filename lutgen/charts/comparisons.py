@@ -6,9 +6,10 @@ import textwrap
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from lutgen import charting, color
-from lutgen.charting import DASHES, GRAY, HUES, inches
-from lutgen.spectra import columns, nanometers, numbers, percent, shades, spectra, sweep, ticks
+from lutgen import color
+from lutgen.charts import drawing
+from lutgen.charts.drawing import DASHES, GRAY, HUES, inches
+from lutgen.charts.spectra import columns, nanometers, numbers, percent, shades, spectra, sweep, ticks
 from lutgen.tissue import LAWS, PRESETS, Skin, reduced_scattering
 
 TYPES = ("Caucasian", "Asian", "African")
@@ -50,7 +51,7 @@ def law_curves(folder: Path) -> str:
     """Reduced scattering over wavelength, by law."""
     nm = nanometers()
     curves = {law: reduced_scattering(Skin(0.01, 0.7, 0.01, scattering=law), nm) for law in LAWS[:-1]}
-    with charting.figure(
+    with drawing.figure(
         8.4, 5.2, "Reduced scattering of skin, by law",
         "`source` is the document's, exactly twice `bashkatov`.\n"
         "`donner` is `source` in the epidermis and half of it in the dermis.",
@@ -62,17 +63,17 @@ def law_curves(folder: Path) -> str:
         axes.grid(axis="y")
         also = {"source": "source\n(donner: epidermis)", "bashkatov": "bashkatov\n(donner: dermis)"}
         ends = [(float(y[-1]), also.get(law, law), hue) for (law, y), hue in zip(curves.items(), HUES, strict=False)]
-        charting.label_ends(axes, 780, ends, 1.6)
+        drawing.label_ends(axes, 780, ends, 1.6)
         rows = [{"wavelength_nm": float(w)} | {f"{law}_per_mm": float(y[i]) for law, y in curves.items()}
                 for i, w in enumerate(nm)]  # fmt: skip
-        charting.save(drawn, folder, "scattering-curves", rows)
+        drawing.save(drawn, folder, "scattering-curves", rows)
     return ", ".join(f"{law} {y[34]:.2f}" for law, y in curves.items()) + " per mm at 550 nm"
 
 
 def law_colors(folder: Path, steps: int) -> str:
     """The document's melanin sweep at two hemoglobins, by scattering law."""
     rows, worst = [], {}
-    with charting.figure(
+    with drawing.figure(
         9.2, 6.3, "Skin color by scattering law: melanin 1.3 % to 43 %, eumelanin 0.7",
         "Exact spectra, default color pipeline. Beside each strip: ΔE00 to `source`, the document's law, at its ends.",
     ) as drawn:  # fmt: skip
@@ -87,7 +88,7 @@ def law_colors(folder: Path, steps: int) -> str:
                 off = color.delta_e00(lab, source)
                 worst[law] = max(worst.get(law, 0.0), float(off.max()))
                 axes = inches(drawn, 1.2, 1.05 + 2.45 * i + 0.4 * j, 6.4, 0.4)
-                charting.strip(axes, rgb, law)
+                drawing.strip(axes, rgb, law)
                 if law == LAWS[-1]:
                     axes.set_axis_on()
                     axes.spines[:].set_visible(False)
@@ -98,7 +99,7 @@ def law_colors(folder: Path, steps: int) -> str:
                 axes.text(1.015, 0.5, words, transform=axes.transAxes, va="center", color=GRAY)
                 rows += [{**asdict(s), **numbers(r, ("default",)), "delta_e00_to_source": float(d)}
                          for s, r, d in zip(ruled, found, off, strict=True)]  # fmt: skip
-        charting.save(drawn, folder, "scattering-colors", rows)
+        drawing.save(drawn, folder, "scattering-colors", rows)
     return "ΔE00 to source at most " + ", ".join(f"{law} {d:.1f}" for law, d in worst.items() if law != "source")
 
 
@@ -107,7 +108,7 @@ def presets(folder: Path) -> str:
     found = dict(zip(PRESETS, spectra(list(PRESETS.values())), strict=True))
     looks = {name: shades(r) for name, r in found.items()}
     groups = [[n for n in PRESETS if n.startswith("source-") == own] for own in (False, True)]
-    with charting.figure(
+    with drawing.figure(
         12.4, 6.4, "Presets fitted to measured skin, and the document's three",
         "Two parameters of each fitted to the mean spectrum of an ITA class (after Lu et al. 2025, ISSA archive). "
         "Default color pipeline;\nm, e, h: melanin, eumelanin, hemoglobin.",
@@ -118,7 +119,7 @@ def presets(folder: Path) -> str:
             x = 2.9 * k
             axes.text(x, 1.0, ("fitted to measured skin", "the document's")[k], color=HUES[k],
                       transform=axes.get_xaxis_transform(), va="bottom")  # fmt: skip
-            for name, y in zip(names, charting.apart([looks[n][1][0] for n in names], 6.4), strict=True):
+            for name, y in zip(names, drawing.apart([looks[n][1][0] for n in names], 6.4), strict=True):
                 (rgb, lab), skin = looks[name], PRESETS[name]
                 axes.fill([x, x + 0.75, x + 0.75, x], [y - 2.9, y - 2.9, y + 2.9, y + 2.9], color=rgb, linewidth=0)
                 axes.plot([x - 0.2, x - 0.03], [lab[0], y], color=HUES[k], linewidth=0.9)
@@ -130,16 +131,16 @@ def presets(folder: Path) -> str:
         axes.set(xlim=(-0.2, 5.6), ylim=(5, 78), ylabel="lightness L*", xticks=[])
         axes.spines["bottom"].set_visible(False)
         dress_spectra(curves)
-        charting.label_ends(curves, 780, labels, 0.115)
+        drawing.label_ends(curves, 780, labels, 0.115)
         rows = [{"preset": n, **asdict(PRESETS[n]), **numbers(r), **columns(r)} for n, r in found.items()]
-        charting.save(drawn, folder, "presets", rows)
+        drawing.save(drawn, folder, "presets", rows)
     return "L* " + ", ".join(f"{name} {lab[0]:.1f}" for name, (_, lab) in looks.items())
 
 
 def published(folder: Path) -> str:
     """The document's three skin types beside Donner & Jensen's of the same names; what no text prints is said."""
     rows, off = [], {}
-    with charting.figure(
+    with drawing.figure(
         10.4, 7.6, "The document's skin types beside Donner & Jensen's of the same names",
         "Exact colors of this model at the printed parameters, not their pictures; default color pipeline.",
     ) as drawn:  # fmt: skip
@@ -156,7 +157,7 @@ def published(folder: Path) -> str:
                 found = spectra([skin])[0]
                 rgb, lab = shades(found)
                 off[name, kind] = float(color.delta_e00(lab, reference))
-                charting.strip(inches(drawn, left, top, 1.35, 1.25), rgb[None])
+                drawing.strip(inches(drawn, left, top, 1.35, 1.25), rgb[None])
                 words = f"{told(skin)}\nL* {lab[0]:.1f}" + (f"   ΔE00 {off[name, kind]:.1f}" if j else "")
                 drawn.text((left + 1.42) / 10.4, 1 - top / 7.6, words, va="top", size=8.5, linespacing=1.5)
                 rows.append({"skin": name, "parameters": kind, **asdict(skin), "delta_e00_to_document": off[name, kind],
@@ -166,7 +167,7 @@ def published(folder: Path) -> str:
                    va="top", size=8.5, color=GRAY, linespacing=1.4)  # fmt: skip
         empty = dict.fromkeys(rows[0], "")
         rows += [empty | dict(zip(("published", "status", "where"), source, strict=True)) for source in SOURCES]
-        charting.save(drawn, folder, "published", rows)
+        drawing.save(drawn, folder, "published", rows)
     return (
         "the document to Donner & Jensen's parameters ΔE00 "
         + ", ".join(f"{name} {off[name, 'printed']:.1f}" for name in TYPES)
