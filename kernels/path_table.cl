@@ -12,6 +12,11 @@
 // beyond the critical angle are mirrored without it) or has outlived its life. Random numbers and the scattering
 // angle come first, so that the processor has them done when it has mispredicted.
 
+// How long the photon of a lane lives, mm. Charts build the walk with another definition, to compare.
+#ifndef LIFE
+#define LIFE exponential(next_bits(&rng), mean_life)
+#endif
+
 // Lanes without a photon wait where nothing happens: far below, with no end of life.
 inline void park(vf *z, vf *life, uint set) {
     float depths[W], lives[W];
@@ -34,7 +39,7 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
     rng_t rng = start_streams(job.seed, job.wavelength, job.block);
     uint launched = min((uint)W, job.photons), running = launched, escaped = 0;
     vf x = 0, y = 0, z = 0, ux = 0, uy = 0, uz = 1, L = 0, Le = 0, shallow = 0;  // shallow = min(z, thickness)
-    vf life = exponential(next_bits(&rng), mean_life);
+    vf life = LIFE;
     park(&z, &life, ~0u << launched);
     ulong events = 0;
 
@@ -91,7 +96,7 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
             cosine = SELECT(cosine, (vf)(1.0f), ended);
             p = SELECT(p, zero, ended);
             q = SELECT(q, zero, ended);
-            life = SELECT(life, exponential(next_bits(&rng), mean_life), ended);
+            life = SELECT(life, LIFE, ended);
             uint spare = job.photons - launched;
             if (count > spare) {  // the block's last photons: the lanes left over fall idle
                 for (uint i = 0; i < spare; i++) gone &= gone - 1u;

@@ -70,9 +70,17 @@ def _parser() -> argparse.ArgumentParser:
     figures.add_argument("--out", required=True, metavar="DIR", help="folder to make")
     figures.set_defaults(run="lutgen.commands.figures")
 
+    chart = commands.add_parser("chart", help="speed against accuracy of every method and setting, as charts")
+    stability = commands.add_parser("stability", help="where each method errs beyond its promise, as maps and a table")
+    for command in (chart, stability):
+        command.add_argument("--out", required=True, metavar="DIR", help="folder to make")
+        command.add_argument("--quick", action="store_true", help="in under a minute: fewer photons, coarser maps")
+    chart.set_defaults(run="lutgen.commands.chart")
+    stability.set_defaults(run="lutgen.commands.stability")
+
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, info, devices, check, bench, figures):
+    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability):
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

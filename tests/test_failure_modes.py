@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from probe import WIDTHS, draws, evaluate, wide
 
 import lutgen
 from lutgen import baking, color, expansion, manifest, profiles, tissue
 from lutgen.paths import PathTable
+from lutgen.probing import WIDTHS, draws, evaluate, wide
 from lutgen.solvers import adding_doubling, path_table
 from lutgen.tissue import Layer
 
@@ -104,6 +104,17 @@ def test_tallies_do_not_stagnate():
     exact = adding_doubling.two_layer_grid(0.1, table.mu_epidermis[:, :1], table.mu_dermis[:, :1], mu_s, g, 1.4)
     sigma = math.sqrt(exact.item() * (table.entry - exact.item()) / 400_000)
     assert abs(table.energy[0, :, 0, 0].sum() - exact.item()) < 4 * sigma + 1e-4
+
+
+def test_counters_do_not_overflow():
+    """Steps of a work-item are counted in 32 bits, its events and the sums in 64; the budget stops short of 2^32."""
+    endless = path_table.Medium(np.array([500.0]), np.array([1e4]), np.array([0.8]), np.array([0.01]), 0.1, 1.4)
+    (job,) = path_table._jobs(endless, 2048, 0, 2048)
+    assert 3.9e9 < job["max_steps"] < 2**32
+    assert path_table.RESULT["events"].itemsize == 8
+    assert path_table.RESULT["escaped"].itemsize * 8 > math.log2(max(path_table.BLOCK_PHOTONS.values()))
+    with pytest.raises(lutgen.InputError, match="photons"):
+        lutgen.reflectance([Layer(np.inf, 1, 10, 0.8)], "path-table", photons=2**31)
 
 
 def _trace(nm, photons, **options) -> PathTable:

@@ -5,11 +5,11 @@ import re
 
 import numpy as np
 import pytest
-from probe import evaluate
 
 import lutgen
 from lutgen import color, expansion, manifest
 from lutgen import device as ocl
+from lutgen.probing import evaluate
 from lutgen.solvers import adding_doubling, path_table
 from lutgen.tissue import Layer
 

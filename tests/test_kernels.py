@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from probe import WIDTHS, draws, evaluate
 from reference import Xoshiro128Plus, fresnel_sin_tan
 
+from lutgen.probing import WIDTHS, draws, evaluate
 from lutgen.solvers import adding_doubling
 
 RANDOM = np.random.default_rng(11)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from probe import WIDTHS, wide
 from reference import TWO_LAYER, document_walk, two_layers
 
 import lutgen
@@ -12,6 +11,7 @@ from lutgen import baking, expansion, profiles, tissue
 from lutgen import device as ocl
 from lutgen.axes import default_grid
 from lutgen.errors import MachineError
+from lutgen.probing import WIDTHS, wide
 from lutgen.solvers import path_table, totals
 from lutgen.tissue import Layer
 

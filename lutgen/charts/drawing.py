@@ -13,10 +13,12 @@ import io
 import os
 import shutil
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from lutgen.axes import Axis
 from lutgen.errors import InputError, MachineError
 
 INK, GRAY, RULE = "#1a1a1a", "#595959", "#dddddd"
@@ -99,6 +101,67 @@ def strip(axes, rgb: np.ndarray, words: str = "", fill: str = INK) -> None:
     axes.imshow(exact, aspect="auto", interpolation="nearest")
     axes.set_axis_off()
     axes.text(-0.012, 0.5, words, transform=axes.transAxes, ha="right", va="center", color=fill)
+
+
+def _borders(cells: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The borders of the cells [Y, X] that are set: x and y of line pieces, each ended by NaN."""
+    row, column = np.nonzero(np.diff(np.pad(cells, ((0, 0), (1, 1))), axis=1))
+    upright = x_edges[[column, column]], y_edges[[row, row + 1]]
+    row, column = np.nonzero(np.diff(np.pad(cells, ((1, 1), (0, 0))), axis=0))
+    level = x_edges[[column, column + 1]], y_edges[[row, row]]
+    pieces = (np.concatenate([a, b], axis=1) for a, b in zip(upright, level, strict=True))
+    x, y = (np.pad(ends, ((0, 1), (0, 0)), constant_values=np.nan).T.ravel() for ends in pieces)
+    return x, y
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """Cells [Y, X] between the nodes of two axes: what colors them, which are outlined and which are hatched."""
+
+    title: str
+    words: str
+    x: Axis
+    y: Axis
+    values: np.ndarray
+    outlined: np.ndarray
+    hatched: np.ndarray
+
+
+def heat_maps(drawn, maps: Sequence[HeatMap], top: float, ends: tuple[float, float], label: str) -> None:
+    """Draw maps, three in a row from `top` inches on, in one logarithmic color scale with its bar at their right."""
+    meshes = []
+    for i, one in enumerate(maps):
+        axes = inches(drawn, 0.95 + 4.0 * (i % 3), top + 3.1 * (i // 3), 3.35, 1.75)
+        meshes.append(_cells(axes, one, ends))
+        axes.set_title(one.title, pad=29)
+        axes.text(0, 1.03, one.words, transform=axes.transAxes, va="bottom", color=GRAY, size=8.5, linespacing=1.3)
+        for side, axis in (("x", one.x), ("y", one.y)):
+            if side == "x" or i % 3 == 0 or axis.name != maps[i - 1].y.name:
+                axes.set(**{f"{side}label": axis.name + ("" if axis.unit == "1" else f" ({axis.unit})")})
+            if axis.spacing == "log":
+                places = [v for k in range(-4, 3) for v in (10.0**k, 3 * 10.0**k) if axis.low <= v <= axis.high]
+                words = [f"{100 * v:g} %" if axis.unit == "volume fraction" else f"{v:g}" for v in places]
+                axes.set(**{f"{side}ticks": places, f"{side}ticklabels": words})
+        axes.minorticks_off()
+    place = inches(drawn, 12.45, top, 0.2, 3.1 * ((len(maps) - 1) // 3) + 1.75)
+    drawn.colorbar(meshes[0], cax=place, label=label, extend="both")
+
+
+def _cells(axes, one: HeatMap, ends: tuple[float, float]):
+    """Draw a map without its words; what a color bar is made of."""
+    axes.set(xscale=one.x.spacing, yscale=one.y.spacing)
+    x, y = one.x.values, one.y.values
+    style = {"norm": "log", "vmin": ends[0], "vmax": ends[1], "cmap": "viridis", "rasterized": True}
+    mesh = axes.pcolormesh(x, y, np.clip(one.values, *ends), **style)
+    change = np.diff(np.pad(one.hatched, ((1, 1), (0, 0))).astype(int), axis=0).T  # 1 where a run starts, -1 behind it
+    (column, low), (_, high) = np.nonzero(change == 1), np.nonzero(change == -1)
+    style = {"fill": False, "linewidth": 0, "edgecolor": (0.1, 0.1, 0.1, 0.6), "hatch": "///", "align": "edge"}
+    axes.bar(x[column], y[high] - y[low], np.diff(x)[column], y[low], **style)
+    axes.plot(*_borders(one.hatched, x, y), color=INK, linewidth=0.8)
+    for color, width in (("white", 4.0), (INK, 1.9)):
+        axes.plot(*_borders(one.outlined, x, y), color=color, linewidth=width, solid_capstyle="projecting")
+    axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
+    return mesh
 
 
 def save(drawn, folder: Path, name: str, rows: Sequence[dict]) -> None:

@@ -69,9 +69,10 @@ def block_photons(device: ocl.Device) -> int:
     return BLOCK_PHOTONS["gpu" if device.kind == "gpu" else "cpu"]
 
 
-def walk_kernel(device: ocl.Device):
-    """The built kernel of kernels/path_table.cl."""
+def walk_kernel(device: ocl.Device, life: str = ""):
+    """The built kernel of kernels/path_table.cl; `life` replaces its LIFE."""
     text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "path_table")
+    text = f"#define LIFE {life}\n{text}" if life else text
     return ocl.kernel(device, "walk", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device)})
 
 
@@ -108,8 +109,9 @@ def _jobs(medium: Medium, photons: int, seed: int, block: int) -> np.ndarray:
 
 
 def _launches(
-    medium: Medium, photons: int, seed: int, device: ocl.Device, blocks_per_launch: int | None, tally: Tally
-) -> Iterator[tuple[np.ndarray, np.ndarray, object, object]]:
+    medium: Medium, photons: int, seed: int, device: ocl.Device, blocks_per_launch: int | None, tally: Tally,
+    life: str = "",
+) -> Iterator[tuple[np.ndarray, np.ndarray, object, object]]:  # fmt: skip
     """Walk all blocks; yield jobs, results, and the device buffers of bank and results after each launch."""
     whole("photons", photons, *PHOTONS)
     whole("seed", seed, *SEEDS)
@@ -129,7 +131,7 @@ def _launches(
     fit = _EVENTS_PER_LAUNCH / (block * (steps_per_life + 1))
     size = blocks_per_launch or int(np.clip(fit, low, high))
     size = min(size, len(jobs))
-    walk = walk_kernel(device)
+    walk = walk_kernel(device, life)
     bank = ocl.buffer(device, 12 * block * size)
     tally.of = photons * len(medium.wavelength_nm)
     for start in range(0, len(jobs), size):
@@ -152,12 +154,16 @@ def walk_only(medium: Medium, photons: int, device: ocl.Device, tally: Tally, se
 
 
 def records(
-    medium: Medium, photons: int, seed: int = 0, device: ocl.Device | None = None, tally: Tally | None = None
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield (wavelength index, exits [n, 3]) block by block; columns: radius, path, path in the epidermis, mm."""
+    medium: Medium, photons: int, seed: int = 0, device: ocl.Device | None = None, tally: Tally | None = None,
+    life: str = "",
+) -> Iterator[tuple[int, np.ndarray]]:  # fmt: skip
+    """Yield (wavelength index, exits [n, 3]) block by block; columns: radius, path, path in the epidermis, mm.
+
+    `life` is an OpenCL expression for how long a photon lives, in place of the life that is drawn (see the kernel).
+    """
     device = device or ocl.choose()
     key = {round(nm * 1000): k for k, nm in enumerate(medium.wavelength_nm)}
-    for jobs, results, bank, _ in _launches(medium, photons, seed, device, None, tally or Tally()):
+    for jobs, results, bank, _ in _launches(medium, photons, seed, device, None, tally or Tally(), life):
         exits = ocl.read(device, bank, np.empty((len(jobs), block_photons(device), 3), "f4"))
         for job, result, rows in zip(jobs, results, exits, strict=True):
             yield key[int(job["wavelength"])], rows[: result["escaped"]]

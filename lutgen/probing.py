@@ -1,4 +1,4 @@
-"""Runs small kernels over the project's OpenCL functions, one value per lane, for tests."""
+"""Runs small kernels over the project's OpenCL functions, one value per lane: for tests and the table of margins."""
 
 from __future__ import annotations
 

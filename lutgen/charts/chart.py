@@ -1,0 +1,24 @@
+"""`lutgen chart`: speed against accuracy, in color, in profiles, by setting and by walk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from lutgen.charts import drawing, settings, shapes, speed, walks
+
+
+def draw(out: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> dict[str, str]:
+    """Draw every chart into the folder `out`, which appears whole or not at all; what each shows, by its name.
+
+    `quick` takes fewer photons, seeds and skins. Raises InputError where `out` holds something, MachineError without
+    matplotlib or OpenCL.
+    """
+    with drawing.folder(out) as folder:
+        shown = {"speed-accuracy": speed.speed(folder, quick, progress)}
+        shown["profiles"] = shapes.shapes(folder, quick, progress)
+        progress("settings", None)
+        shown["settings"] = settings.settings(folder, quick)
+        progress("walks", None)
+        shown["walks"] = walks.walks(folder, quick)
+    return shown
