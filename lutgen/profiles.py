@@ -76,16 +76,16 @@ def taps(shapes: np.ndarray, radius_edges_mm: np.ndarray, count: int = 64) -> np
     ring spreads its energy evenly in radius.
     """
     P = np.moveaxis(encircled(np.moveaxis(shapes, 1, -1)), 1, -1)  # [N, B + 1, 3]
-    r90 = _inverse(P.transpose(0, 2, 1), radius_edges_mm, np.array([0.9]))[..., 0]
+    r90 = inverse(P.transpose(0, 2, 1), radius_edges_mm, np.array([0.9]))[..., 0]
     widest = np.take_along_axis(P, r90.argmax(axis=1)[:, None, None], axis=2)[:, :, 0]
-    radius = _inverse(widest, radius_edges_mm, (np.arange(count) + 0.5) / count)
+    radius = inverse(widest, radius_edges_mm, (np.arange(count) + 0.5) / count)
     ring = np.clip(np.searchsorted(radius_edges_mm, radius, side="right") - 1, 0, len(radius_edges_mm) - 2)
     along = (radius - radius_edges_mm[ring]) / np.diff(radius_edges_mm)[ring]
     low, high = (np.take_along_axis(P, (ring + i)[..., None], axis=1) for i in (0, 1))
     return np.concatenate([radius[..., None], low + along[..., None] * (high - low)], axis=-1)
 
 
-def _inverse(P: np.ndarray, radius_edges_mm: np.ndarray, shares: np.ndarray) -> np.ndarray:
+def inverse(P: np.ndarray, radius_edges_mm: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """Radii [..., S] at which encircled energies P [..., B + 1] reach the shares [S]."""
     above = (P[..., None, :] < shares[:, None]).sum(axis=-1)  # first edge at or above the share
     above = np.clip(above, 1, P.shape[-1] - 1)

@@ -143,17 +143,17 @@ def test_refusals_are_the_documented_limits(domain):
 
     by_g, by_n, near_1, over, under, near_2 = domain
     g, a = at(by_g)
-    assert np.array_equal(by_g.refused, (g < dipole.LEAST_G) | (a < dipole.least_albedo(1.4)))
+    assert np.array_equal(by_g.refused, (g < 0) | (a < 0.94))
     n, a = at(by_n)
     least = np.array([dipole.least_albedo(float(v)) for v in n[0]])
-    assert np.array_equal(by_n.refused, (n > dipole.GREATEST_N) | (a < least))
+    assert np.array_equal(by_n.refused, (n > 1.6) | (a < least))
     t, a = at(over)
-    assert np.array_equal(over.refused, (t < multipole.LEAST_THICKNESS) | (a < dipole.least_albedo(1.4)))
+    assert np.array_equal(over.refused, (t < 1) | (a < 0.94))
     t, a = at(under)
-    assert np.array_equal(under.refused, (t < multipole.LEAST_THICKNESS) | (a < multipole.LEAST_ALBEDO_BELOW))
+    assert np.array_equal(under.refused, (t < 1) | (a < 0.92))
     for one in (near_1, near_2):
         r, a = at(one)
-        assert np.array_equal(one.refused, (r < dipole.LEAST_RADIUS) | (a < dipole.least_albedo(1.4)))
+        assert np.array_equal(one.refused, (r < 1) | (a < 0.94))
     for one in domain:
         assert 0 < one.refused.sum() < one.refused.size
         assert not (one.beyond & ~one.refused).any()
@@ -187,6 +187,11 @@ def test_profiles_are_compared_with_direct(domain):
     for near in (domain[2], domain[5]):
         assert (near.error[:, 0] < 0).all()
         assert int(near.note.split()[1]) < 40
+
+
+def test_cells_have_their_centers_in_the_axis_spacing():
+    assert maps.centers(Axis("radius", "mm", 1, 100, 3, "log")).round(3).tolist() == [3.162, 31.623]
+    assert maps.centers(Axis("radius", "mm", 1, 101, 3)).tolist() == [26, 76]
 
 
 def test_words_count_the_cells():

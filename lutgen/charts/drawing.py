@@ -91,7 +91,8 @@ def label_ends(axes, x: float, labels: Sequence[tuple[float, str, str]], least: 
     for (y, words, color), place in zip(labels, 10**moved if log else moved, strict=True):
         placed = {"textcoords": ("offset points", "data"), "annotation_clip": False}
         line = {"arrowstyle": "-", "color": color, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 2}
-        axes.annotate(words, (x, y), (16, place), color=color, size=size, va="center", **placed)
+        ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+        axes.annotate(words, (x, y), (16, place), color=color, size=size, va="center", bbox=ground, **placed)
         axes.annotate("", (x, y), (14, place), arrowprops=line, **placed)
 
 

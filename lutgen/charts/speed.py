@@ -68,7 +68,7 @@ def _panel(axes, found: list[Run], floors: dict[str, float], error: str) -> None
     whole = [(run.seconds, getattr(run, error)) for run in medians if run.share == 1]
     front = np.array([whole[i] for i in contenders.pareto(whole)])
     axes.plot(*front.T, color=FRONT, linewidth=7, solid_capstyle="round", zorder=0)
-    axes.annotate("Pareto front of whole LUTs", front[-1], (12, -16), textcoords="offset points", color=GRAY, size=8.5)
+    axes.annotate("Pareto front of whole LUTs", front[-1], (14, 8), textcoords="offset points", color=GRAY, size=8.5)
     for run in found:
         if run.method in _HUE:
             axes.plot(run.seconds, getattr(run, error), ".", color=HUES[_HUE[run.method]], markersize=3, zorder=2)
@@ -83,26 +83,26 @@ def _panel(axes, found: list[Run], floors: dict[str, float], error: str) -> None
         if method.startswith("path table,") and method in _HUE:
             place = (-4, 34) if method == medians[0].method else (-10, -150)
             leader = {"arrowstyle": "-", "color": hue, "linewidth": 0.6, "relpos": (0, 1 if place[1] < 0 else 0)}
-            words = f"{method},\n{line[0].photons:,} to {line[-1].photons:,} photons each"
+            words = f"{method},\n{line[0].photons:,} to {line[-1].photons:,}\nphotons each"
             axes.annotate(words, (x[0], y[0]), place, textcoords="offset points", color=hue, size=9, arrowprops=leader,
-                          linespacing=1.05)  # fmt: skip
+                          linespacing=1.05, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})  # fmt: skip
         elif method not in _HUE:
             alone.append((x[0], y[0], method))
     walks = [run for run in medians if run.method.startswith("direct") and run.photons == medians[-1].photons]
     ends = [(getattr(run, error), f"{run.method}, {run.photons:,}", HUES[_HUE[run.method]]) for run in walks]
     drawing.label_ends(axes, max(run.seconds for run in walks), ends, 0.11)
-    _name_points(axes, [point for point in alone if point[1] < 1], 24)
+    _name_points(axes, [point for point in alone if point[1] < 1], 46)
     _name_points(axes, [point for point in alone if point[1] >= 1], 0)
     _slope(axes, next(run for run in medians if run.method == "path table, 8 wavelengths"), error)
 
 
-def _name_points(axes, points: list[tuple[float, float, str]], lift: float) -> None:
-    """Names above points on thin lines, the leftmost highest, so that no line crosses a name."""
+def _name_points(axes, points: list[tuple[float, float, str]], drop: float) -> None:
+    """Names below points on thin lines, the leftmost lowest, so that no line crosses a name; beside them without."""
     for k, (x, y, name) in enumerate(sorted(points, reverse=True)):
-        leader = {"arrowstyle": "-", "color": GRAY, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4, "relpos": (0, 0)}
-        place = (0, lift + 15 * k) if lift else (8, 0)
+        leader = {"arrowstyle": "-", "color": GRAY, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4, "relpos": (0, 1)}
+        place = (0, -drop - 15 * k) if drop else (8, 0)
         axes.annotate(name, (x, y), place, textcoords="offset points", size=8.5, color=INK,
-                      arrowprops=leader if lift else None, va="bottom" if lift else "center")  # fmt: skip
+                      arrowprops=leader if drop else None, va="top" if drop else "center")  # fmt: skip
 
 
 def _slope(axes, start: Run, error: str) -> None:
