@@ -110,7 +110,7 @@ def test_counters_do_not_overflow():
     """Steps of a work-item are counted in 32 bits, its events and the sums in 64; the budget stops short of 2^32."""
     endless = path_table.Medium(np.array([500.0]), np.array([1e4]), np.array([0.8]), np.array([0.01]), 0.1, 1.4)
     (job,) = path_table._jobs(endless, 2048, 0, 2048)
-    assert 3.9e9 < job["max_steps"] < 2**32
+    assert job["max_steps"] == 4_000_000_000
     assert path_table.RESULT["events"].itemsize == 8
     assert path_table.RESULT["escaped"].itemsize * 8 > math.log2(max(path_table.BLOCK_PHOTONS.values()))
     with pytest.raises(lutgen.InputError, match="photons"):
@@ -213,8 +213,10 @@ def _with(jobs, **fields):
 
 
 def test_quadrature_does_not_drift_with_nodes():
-    values = [lutgen.reflectance(lutgen.layers(lutgen.preset("dark"), 450), nodes=n).diffuse for n in (16, 32, 64)]
-    assert np.ptp(values) < 1e-6
+    """Dark skin, and forward scattering, where too many Legendre moments are no longer integrated."""
+    for stack in (lutgen.layers(lutgen.preset("dark"), 450), [Layer(np.inf, 0.5, 100, 0.9, 1.4)]):
+        values = [lutgen.reflectance(stack, nodes=n).diffuse for n in (16, 32, 64)]
+        assert np.ptp(values) < 1e-6
 
 
 def test_profile_tails_are_stored_as_floats(tmp_path):

@@ -213,7 +213,7 @@ FAILURE_LIST: tuple[tuple[str, str, Callable[[], Measured]], ...] = (
     ("weak generators", f"{KERNELS}::test_output_is_uniform_in_every_bit_used_and_in_pairs", _generator),
     ("overlapping streams", f"{FAILURES}::test_streams_do_not_overlap", _streams),
     ("roulette bias", f"{DIRECT}::test_roulette_is_unbiased", _roulette),
-    ("zero-thickness or clear top layer", f"{FAILURES}::test_zero_thickness_and_clear_top_layers", _clear_top),
+    ("zero-thickness or clear top layer", f"{DIRECT}::test_clear_layers_and_zero_thickness", _clear_top),
     ("μa = 0 in a semi-infinite medium", f"{FAILURES}::test_no_absorption_in_a_semi_infinite_medium", _endless),
     ("diffusion at low albedo", f"{DIFFUSION}::test_dipole_refuses_what_it_must_not_be_trusted_with", _low_albedo),
     ("diffusion near the source", f"{DIFFUSION}::test_radii_nearer_than_a_mean_free_path_are_refused", _near_source),
