@@ -78,9 +78,25 @@ def _parser() -> argparse.ArgumentParser:
     chart.set_defaults(run="lutgen.commands.chart")
     stability.set_defaults(run="lutgen.commands.stability")
 
+    view = commands.add_parser("view", help="a face that changes skin as sliders move, or a picture of it")
+    sheet = commands.add_parser("sheet", help="a picture of every preset on a head")
+    for command in (view, sheet):
+        command.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
+        command.add_argument("--mesh", metavar="FILE", help="GLB, glTF, OBJ or lee-perry-smith (default: built-in)")
+        command.add_argument("--mm-per-unit", type=float, help="millimetres per unit of the mesh (default: a guess)")
+        command.add_argument("--maps", metavar="DIR", help="texture maps by name: melanin.png, normal.png, ...")
+        command.add_argument("--look", metavar="FILE", help="look that the viewer saved (TOML)")
+        command.add_argument("--preset", help="chromophores of a preset: light, dark, ...")
+        command.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one value of the look")
+        command.add_argument("--size", default=None, help="pixels: 640x360")
+    view.add_argument("--screenshot", metavar="FILE", help="write a picture instead of opening a window")
+    view.set_defaults(run="lutgen.commands.view")
+    sheet.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
+    sheet.set_defaults(run="lutgen.commands.sheet")
+
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability):
+    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability, view, sheet):
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

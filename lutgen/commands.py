@@ -246,3 +246,17 @@ def _drawn(options: Namespace, draw: Callable[..., dict[str, str]]) -> Outcome:
         shown = draw(out, progress=progress)
     text = f"{out.absolute()}\n" + "\n".join(f"{name}: {words}" for name, words in shown.items())
     return {"out": str(out.absolute()), "charts": shown}, text, 0
+
+
+def view(options: Namespace) -> Outcome:
+    """`lutgen view`: the viewer, or with --screenshot one picture of it."""
+    from lutgen import showing
+
+    return showing.view(options)
+
+
+def sheet(options: Namespace) -> Outcome:
+    """`lutgen sheet`: every preset on a head."""
+    from lutgen import showing
+
+    return showing.sheet(options)

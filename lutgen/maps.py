@@ -1,0 +1,146 @@
+"""Texture maps of a head: what each is called, how it is encoded, and how a folder of them becomes four textures.
+
+Chromophore maps hold ratios that the sliders' values are multiplied with. As 8- or 16-bit pictures a texel t in 0 to 1
+stands for the ratio 4 t^3, so that dark and light tones get equal steps (1 is t = 0.63); as EXR for the ratio itself.
+Roughness and specular are ratios 2 t; occlusion is t; thickness is 32 t mm; in EXR all are values as they are.
+Row 0 of every array here is the bottom of the picture, where v is 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lutgen.errors import InputError
+
+RATIO_RANGE, SURFACE_RANGE, THICKNESS_MM = 4.0, 2.0, 32.0
+RATIOS = ("melanin", "eumelanin", "hemoglobin")
+SURFACE = ("roughness", "specular", "occlusion", "thickness")
+NAMES = (*RATIOS, *SURFACE, "normal", "albedo")
+SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Textures for the viewer: `chromophores` ratios [.., .., 3], `surface` [.., .., 4] (roughness and specular ratio,
+    occlusion, thickness / 32 mm), `normal` [.., .., 3] in 0 to 1, `albedo` linear sRGB [.., .., 3]; None: not given."""
+
+    chromophores: np.ndarray | None = None
+    surface: np.ndarray | None = None
+    normal: np.ndarray | None = None
+    albedo: np.ndarray | None = None
+
+
+def encode_ratio(ratio: np.ndarray) -> np.ndarray:
+    """The 8-bit texel of a ratio in 0 to 4.
+
+    >>> encode_ratio(np.array([0.0, 1.0, 4.0])).tolist()
+    [0, 161, 255]
+    """
+    return np.round(255 * np.cbrt(np.clip(ratio, 0, RATIO_RANGE) / RATIO_RANGE)).astype("u1")
+
+
+def decode_ratio(texel: np.ndarray) -> np.ndarray:
+    """The ratio of a texel in 0 to 1.
+
+    >>> round(float(decode_ratio(np.array(161 / 255))), 2)
+    1.01
+    """
+    return RATIO_RANGE * np.asarray(texel, float) ** 3
+
+
+def read(path: Path) -> tuple[np.ndarray, bool]:
+    """A picture [rows, columns, 1 or 3 channels], first row lowest, and whether it holds values (EXR) or texels 0 to 1.
+
+    8- and 16-bit pictures, gray, palette or color, with alpha or without, of any size; InputError for anything else.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"map {path}: there is no such file")
+    if path.suffix.lower() == ".exr":
+        from lutgen import exr
+
+        channels = next(iter(exr.read(path).values())).channels
+        names = [n for n in "RGB" if n in channels] or list(channels)[:1]
+        values, given = np.stack([channels[n].astype(float) for n in names], axis=-1), True
+    else:
+        values, given = _picture(path), False
+    if values.shape[-1] == 2:
+        values = values[..., :1]
+    if not np.all(np.isfinite(values)):
+        raise InputError(f"map {path}: holds NaN or infinite values; mend it")
+    return values[::-1], given
+
+
+def _picture(path: Path) -> np.ndarray:
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            image.load()
+            if image.mode.startswith("I;16") or image.mode == "I":
+                return np.asarray(image, float)[..., None] / 65535
+            if image.mode in ("1", "L", "LA"):
+                return np.asarray(image.convert("L"), float)[..., None] / 255
+            return np.asarray(image.convert("RGB"), float) / 255
+    except (OSError, ValueError, SyntaxError) as error:
+        raise InputError(f"map {path}: not a picture that can be read ({error})") from error
+
+
+def load(folder: Path) -> Maps:
+    """The maps that a folder holds, by name (`melanin.png`, `thickness.exr` ...); InputError where there is none."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"maps = {folder}: there is no such folder")
+    found = {}
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() in SUFFIXES and path.stem in NAMES:
+            if path.stem in found:
+                raise InputError(f"maps: {path.stem} is there twice, {found[path.stem].name} and {path.name}; keep one")
+            found[path.stem] = path
+    if not found:
+        raise InputError(f"maps = {folder}: holds none of {', '.join(NAMES)} (as {', '.join(SUFFIXES)})")
+    values = {name: _decoded(name, *read(path)) for name, path in found.items()}
+    return Maps(
+        _together(values, dict.fromkeys(RATIOS, 1.0)),
+        _together(values, {"roughness": 1.0, "specular": 1.0, "occlusion": 1.0, "thickness": 1.0}),
+        _color(values.get("normal")), _color(values.get("albedo")),
+    )  # fmt: skip
+
+
+def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:
+    """What a map's texels stand for; thickness as a share of 32 mm."""
+    if name in ("normal", "albedo"):
+        if name == "albedo" and not given:
+            return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+        return values
+    values = values.mean(axis=-1)
+    if given:
+        return np.clip(values / THICKNESS_MM, 0, 1) if name == "thickness" else values
+    return decode_ratio(values) if name in RATIOS else values * (SURFACE_RANGE if name in SURFACE[:2] else 1.0)
+
+
+def _color(values: np.ndarray | None) -> np.ndarray | None:
+    return None if values is None else np.broadcast_to(values, (*values.shape[:2], 3))
+
+
+def _together(values: dict[str, np.ndarray], plain: dict[str, float]) -> np.ndarray | None:
+    """Maps of one texture stacked [rows, columns, channels] at the size of the largest; None if none is given."""
+    present = [values[name] for name in plain if name in values]
+    if not present:
+        return None
+    rows, columns = (max(v.shape[k] for v in present) for k in (0, 1))
+    layers = [
+        resized(values[n], rows, columns) if n in values else np.full((rows, columns), v) for n, v in plain.items()
+    ]
+    return np.stack(layers, axis=-1)
+
+
+def resized(values: np.ndarray, rows: int, columns: int) -> np.ndarray:
+    """A map [R, C] read linearly at another size."""
+    down = np.clip((np.arange(rows) + 0.5) / rows * values.shape[0] - 0.5, 0, values.shape[0] - 1)
+    across = np.clip((np.arange(columns) + 0.5) / columns * values.shape[1] - 0.5, 0, values.shape[1] - 1)
+    by_row = np.array([np.interp(down, np.arange(values.shape[0]), values[:, k]) for k in range(values.shape[1])])
+    return np.array([np.interp(across, np.arange(values.shape[1]), line) for line in by_row.T])

@@ -1,0 +1,88 @@
+"""What `lutgen view` and `lutgen sheet` do: options in, the viewer or a picture out."""
+
+from __future__ import annotations
+
+import importlib
+from argparse import Namespace
+from dataclasses import asdict
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+import lutgen
+from lutgen import manifest, scene
+from lutgen.errors import InputError, MachineError, cannot_write
+from lutgen.scene import Look
+
+Outcome = tuple[dict, str, int]
+SHEET_SIZE = "480x480"
+PICTURE_SIZE = "1280x720"
+
+
+def _viewer(module: str) -> ModuleType:
+    """A module of the viewer, which needs packages that a bake does not."""
+    try:
+        return importlib.import_module(f"lutgen.viewer.{module}")
+    except ImportError as error:
+        if (error.name or "").startswith("lutgen"):
+            raise
+        raise MachineError(f'the viewer needs {error.name}, which is missing: pip install "lutgen[view]"') from error
+
+
+def look_of(options: Namespace) -> Look:
+    """The look that --look, --preset and --set give, in that order."""
+    look = scene.load(Path(options.look)) if options.look else Look()
+    if options.preset is not None:
+        look = scene.of_preset(options.preset, look)
+    values = {}
+    for text in options.set:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"--set {text}: NAME=VALUE is needed, for example melanin=0.05")
+        values[name.strip().replace("-", "_")] = value.strip()
+    return scene.changed(look, values)
+
+
+def _stage(options: Namespace, size: str):
+    """The stage that the options describe, and what is to be said about its head."""
+    app = _viewer("app")
+    pixels = app.size_of(options.size or size)
+    luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
+    shape, given = app.model(options.mesh, options.mm_per_unit, options.maps)
+    return app, luts, shape, given, pixels
+
+
+def _write(pixels: np.ndarray, path: str) -> None:
+    from PIL import Image
+
+    try:
+        Image.fromarray(pixels).save(path)
+    except ValueError as error:
+        raise InputError(f"{path}: the name of a picture is needed, for example out.png ({error})") from error
+    except OSError as error:
+        raise cannot_write("picture", path, error) from error
+
+
+def view(options: Namespace) -> Outcome:
+    """Open the window, or draw one picture without one."""
+    look = look_of(options)
+    app, luts, shape, given, size = _stage(options, PICTURE_SIZE)
+    said = [*shape.notes, *([shape.attribution] if shape.attribution != "built-in" else [])]
+    if options.screenshot is None:
+        _viewer("window").run(luts, shape, given, look, size)
+        return {"look": asdict(look), "notes": said}, "\n".join(said), 0
+    _write(app.picture(app.open_stage(luts, shape, given, size), look), options.screenshot)
+    text = "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *said])
+    return {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": said}, text, 0
+
+
+def sheet(options: Namespace) -> Outcome:
+    """Draw every preset beside the others."""
+    look = look_of(options)
+    app, luts, shape, given, size = _stage(options, SHEET_SIZE)
+    pixels = app.sheet(app.open_stage(luts, shape, given, size), look)
+    _write(pixels, options.out)
+    said = [*shape.notes, *([shape.attribution] if shape.attribution != "built-in" else [])]
+    text = "\n".join([f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets", *said])
+    return {"sheet": options.out, "presets": list(scene.PRESETS), "notes": said}, text, 0

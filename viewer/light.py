@@ -1,0 +1,101 @@
+"""Light of a scene: the built-in studio or a picture of the surroundings, its irradiance, and the specular's energy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+REFRACTIVE_INDEX = 1.4
+STUDIO = (  # direction, sharpness, color times strength
+    ((0.45, 0.55, 0.70), 14.0, (3.20, 3.10, 2.94)),
+    ((-0.85, 0.25, 0.45), 10.0, (0.83, 0.96, 1.10)),
+    ((0.30, 0.35, -0.90), 20.0, (2.50, 2.38, 2.25)),
+)
+"""Soft boxes: exp(sharpness (cos - 1)) lobes, linear ACEScg."""
+_GROUND, _SKY = np.array([0.088, 0.083, 0.080]), np.array([0.29, 0.31, 0.335])
+
+
+def studio(directions: np.ndarray) -> np.ndarray:
+    """Radiance [N, 3] of the studio from unit directions [N, 3]; the same as `studio` in environment.glsl."""
+    t = np.clip((directions[:, 1] + 0.6) / 1.5, 0, 1)
+    s = (t * t * (3 - 2 * t))[:, None]
+    light = _GROUND * (1 - s) + _SKY * s
+    for way, sharpness, color in STUDIO:
+        toward = np.array(way) / np.linalg.norm(way)
+        light = light + np.array(color) * np.exp(sharpness * (directions @ toward - 1))[:, None]
+    return light
+
+
+def constants() -> str:
+    """GLSL constants of the studio and of what leaves the skin."""
+    ways = [np.array(way) / np.linalg.norm(way) for way, _, _ in STUDIO]
+    count = len(STUDIO)
+
+    def vectors(rows) -> str:
+        return ", ".join("vec3(" + ", ".join(f"{v:.9g}" for v in row) + ")" for row in rows)
+
+    return "\n".join([
+        f"const int STUDIO_LOBES = {count};",
+        f"const float STUDIO_SHARPNESS[{count}] = float[]({', '.join(f'{s:.1f}' for _, s, _ in STUDIO)});",
+        f"const vec3 STUDIO_DIRECTION[{count}] = vec3[]({vectors(ways)});",
+        f"const vec3 STUDIO_COLOR[{count}] = vec3[]({vectors(c for _, _, c in STUDIO)});",
+        f"const float EXIT_MEAN = {exit_mean():.9g};",
+    ])  # fmt: skip
+
+
+def fibonacci(count: int) -> np.ndarray:
+    """Unit directions [count, 3], evenly spread."""
+    i = np.arange(count) + 0.5
+    y, turn = 1 - 2 * i / count, i * 2.39996323
+    r = np.sqrt(1 - y * y)
+    return np.stack([r * np.cos(turn), y, r * np.sin(turn)], axis=1)
+
+
+def irradiance_sh(directions: np.ndarray, radiance: np.ndarray) -> np.ndarray:
+    """Cosine-convolved harmonics [9, 3] of radiance [N, 3] evenly spread (Ramamoorthi & Hanrahan 2001)."""
+    x, y, z = directions.T
+    basis = np.stack([
+        0.282095 + 0 * x, 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
+        0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y),
+    ])  # fmt: skip
+    bands = np.array([np.pi] + [2 * np.pi / 3] * 3 + [np.pi / 4] * 5)
+    return bands[:, None] * (basis @ radiance) * (4 * np.pi / len(directions))
+
+
+def fresnel(cosine: np.ndarray) -> np.ndarray:
+    """Schlick's reflectance at index 1.4, as the shaders have it."""
+    f0 = ((REFRACTIVE_INDEX - 1) / (REFRACTIVE_INDEX + 1)) ** 2
+    return f0 + (1 - f0) * (1 - cosine) ** 5
+
+
+def exit_mean() -> float:
+    """Mean of what a cosine lobe lets out: 2 * integral of (1 - F(c)) c dc, which the exit lobe is divided by."""
+    x, w = np.polynomial.legendre.leggauss(64)
+    c = (x + 1) / 2
+    return float(((1 - fresnel(c)) * c * w).sum())
+
+
+def entry_of_the_sky() -> float:
+    """What an even sky enters with, relative to light along the normal."""
+    return exit_mean() / float(1 - fresnel(np.ones(1))[0])
+
+
+def ggx_albedo(size: int = 32, samples: int = 96) -> np.ndarray:
+    """Directional albedo [roughness, root of cosine, 2] of one GGX lobe: at F = 1, and weighted with (1 - v.h)^5.
+
+    Height-correlated Smith visibility; half vectors drawn by the distribution on a regular grid (Walter et al. 2007).
+    """
+    u, v = np.stack(np.meshgrid(*2 * [(np.arange(samples) + 0.5) / samples])).reshape(2, -1)
+    table = np.zeros((size, size, 2))
+    for i, roughness in enumerate(np.linspace(0, 1, size)):
+        a2 = max(roughness, 0.02) ** 4
+        cos_h = np.sqrt((1 - u) / (1 + (a2 - 1) * u))
+        sin_h, turn = np.sqrt(1 - cos_h**2), 2 * np.pi * v
+        for j, c in enumerate(np.linspace(0, 1, size) ** 2):  # close at grazing, where it is steep
+            nv = max(c, 1e-3)
+            vh = np.sqrt(1 - nv * nv) * sin_h * np.cos(turn) + nv * cos_h
+            nl = 2 * vh * cos_h - nv
+            ok = (nl > 0) & (vh > 0)
+            smith = 0.5 / (nl * np.sqrt(nv * nv * (1 - a2) + a2) + nv * np.sqrt(nl * nl * (1 - a2) + a2) + 1e-9)
+            weight = np.where(ok, 4 * smith * nl * vh / np.maximum(cos_h, 1e-9), 0)
+            table[i, j] = weight.mean(), (weight * (1 - np.clip(vh, 0, 1)) ** 5).mean()
+    return table

@@ -1,0 +1,249 @@
+"""The passes of a frame: shadow, surface, scattering, composition; from a head, its maps and a LUT set to pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import moderngl
+import numpy as np
+
+from lutgen import color, scene
+from lutgen.lutset import LutSet
+from lutgen.scene import Look
+
+from . import gl, light, textures
+
+TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
+REFERENCE_FRAMES = 16
+SHADOW_SIZE = 1024
+SAMPLES = 2
+"""Pixels shaded along x and y for one shown."""
+_MAPS = ("normal", "chromophores", "surface", "detail")
+_PLAIN = {"normal": (0.5, 0.5, 1.0, 1.0), "chromophores": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0),
+          "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
+"""What stands for a map that is not given: no bumps, the sliders' skin, no occlusion, too thick for light."""
+_LIGHT_SKIN = (0.0127, 0.7, 0.0077)
+
+
+@dataclass
+class Stage:
+    """Everything on the GPU: programs, head, maps, LUT set, targets of one size."""
+
+    size: tuple[int, int]
+    luts: LutSet
+    uploaded: textures.LutTextures
+    burley: textures.LutTextures | None
+    surface: moderngl.Program
+    shadow: moderngl.Program
+    gather: gl.Pass
+    compose: gl.Pass
+    head: moderngl.VertexArray
+    head_shadow: moderngl.VertexArray
+    indices: int
+    center_mm: np.ndarray
+    radius_mm: float
+    maps: dict
+    environment: np.ndarray
+    environment_map: moderngl.Texture
+    ggx: moderngl.Texture
+    targets: dict
+    oxygenation: float
+    seconds: dict = field(default_factory=dict)
+
+
+def open_stage(mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int, int]) -> Stage:
+    """Upload a head (positions_mm, normals, uv, triangles), its maps [rows, columns, channels] and a LUT set."""
+    context = gl.context()
+    uploaded = textures.upload(luts)
+    made = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
+    surface = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", made))
+    shadow = context.program(gl.splice("shadow.vert.glsl"), gl.splice("shadow.frag.glsl"))
+    uv = mesh.uv if mesh.uv is not None else np.zeros((len(mesh.positions_mm), 2))
+    vertices = np.concatenate([mesh.positions_mm, mesh.normals, uv], axis=1).astype("f4")
+    buffer = context.buffer(vertices.tobytes())
+    indices = context.buffer(np.ascontiguousarray(mesh.triangles, "i4").tobytes())
+    head = context.vertex_array(surface, [(buffer, "3f 3f 2f", "position", "normal", "uv")], indices)
+    cast = context.vertex_array(shadow, [(buffer, "3f 20x", "position")], indices)
+    center = (mesh.positions_mm.max(axis=0) + mesh.positions_mm.min(axis=0)) / 2
+    directions = light.fibonacci(4096)
+    albedo = light.ggx_albedo().astype("f4")
+    ggx = gl.texture((albedo.shape[1], albedo.shape[0]), 2, "f4", np.ascontiguousarray(albedo).tobytes())
+    ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    stage = Stage(
+        size, luts, uploaded, None, surface, shadow, gl.full_screen("gather.frag.glsl", made),
+        gl.full_screen("compose.frag.glsl"), head, cast, mesh.triangles.size, center,
+        float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
+        {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
+        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx, {},
+        luts.oxygenation,
+    )  # fmt: skip
+    resize(stage, size)
+    return stage
+
+
+def _map(values: np.ndarray | None, plain: tuple[float, ...]) -> moderngl.Texture:
+    """A filtered texture of a map in 0 to 1 (8-bit) or of floats; of one plain texel where there is none."""
+    values = np.array([[plain]], "f4") if values is None else values
+    if values.ndim == 2:
+        values = values[..., None]
+    kind = "f1" if values.dtype == np.uint8 else "f2"
+    data = np.ascontiguousarray(values if kind == "f1" else values.astype("f2"))
+    made = gl.context().texture((data.shape[1], data.shape[0]), data.shape[2], data.tobytes(), alignment=1, dtype=kind)
+    made.build_mipmaps()
+    made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    made.anisotropy = 8.0
+    return made
+
+
+def set_map(stage: Stage, name: str, values: np.ndarray | None) -> None:
+    """Exchange one of the head's maps."""
+    stage.maps[name].release()
+    stage.maps[name] = _map(values, _PLAIN[name])
+
+
+def resize(stage: Stage, size: tuple[int, int]) -> None:
+    """Make the targets of a frame of that size in pixels."""
+    for target in stage.targets.values():
+        target.release()
+    context, large = gl.context(), (size[0] * SAMPLES, size[1] * SAMPLES)
+    names = "entering", "facing", "skin", "reflected", "detail"
+    layers = {name: gl.texture(large, 4, "f4" if name in ("entering", "skin") else "f2") for name in names}
+    depth = context.depth_renderbuffer(large)
+    cast = context.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
+    cast.compare_func = ""
+    cast.repeat_x = cast.repeat_y = False
+    scattered, pixels = gl.texture(large, 4, "f4"), gl.texture(size, 4, "f1")
+    stage.targets = layers | {
+        "depth": depth, "cast": cast, "scattered": scattered, "pixels": pixels,
+        "surface_buffer": context.framebuffer(list(layers.values()), depth),
+        "shadow_buffer": context.framebuffer(depth_attachment=cast),
+        "scattered_buffer": context.framebuffer([scattered]), "pixel_buffer": context.framebuffer([pixels]),
+    }  # fmt: skip
+    stage.size = size
+
+
+def set_oxygenation(stage: Stage, oxygenation: float) -> None:
+    """Expand the LUTs from their stored paths to another oxygenation and upload them."""
+    if oxygenation != stage.oxygenation:
+        textures.rewrite(stage.uploaded, *textures.tables(stage.luts.expand(oxygenation=oxygenation)))
+        stage.oxygenation = oxygenation
+
+
+def draw(stage: Stage, look: Look) -> None:
+    """Draw one frame into the stage's pixels; a split view draws its right half as `look.split` says."""
+    set_oxygenation(stage, look.oxygenation)
+    _shadow(stage, look)
+    camera = scene.camera(look, *stage.size)
+    _surface(stage, look, camera)
+    width, height = (n * SAMPLES for n in stage.size)
+    halves = [(0, width)] if look.split == "none" else [(0, width // 2), (width // 2, width)]
+    for k, (left, right) in enumerate(halves):
+        other = look.split if k else "none"
+        _scatter(stage, look, camera, other, (left, 0, right - left, height))
+    _compose(stage, look)
+    gl.check()
+
+
+def _light_clip(stage: Stage, look: Look) -> np.ndarray:
+    """Orthographic clip space that the light sees the whole head in."""
+    way, radius = scene.light_direction(look), stage.radius_mm
+    box = np.diag([1 / radius, 1 / radius, -1 / (1.5 * radius), 1.0])
+    box[2, 3] = -4 / 3
+    return box @ scene.look_at(stage.center_mm + 2 * radius * way, stage.center_mm)
+
+
+def _shadow(stage: Stage, look: Look) -> None:
+    buffer = stage.targets["shadow_buffer"]
+    buffer.use()
+    buffer.clear(depth=1.0)
+    gl.context().enable_only(moderngl.DEPTH_TEST)
+    gl.put(stage.shadow, light_clip=_light_clip(stage, look))
+    stage.head_shadow.render()
+
+
+def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
+    program, buffer = stage.surface, stage.targets["surface_buffer"]
+    buffer.use()
+    buffer.clear(0.0, 0.0, 0.0, 0.0)
+    gl.context().enable_only(moderngl.DEPTH_TEST)
+    gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
+            surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], shadow_map=stage.targets["cast"],
+            environment_map=stage.environment_map, ggx_albedo=stage.ggx)  # fmt: skip
+    grid = stage.luts.color_lut.grid
+    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
+    gl.put(
+        program, view=camera.view, projection=camera.projection, light_clip=_light_clip(stage, look),
+        shadow_offset_mm=0.6,
+        light_direction=scene.light_direction(look), light_color=look.light * SUN, eye=camera.eye_mm,
+        chromophores=(look.melanin, look.eumelanin, look.hemoglobin), contrast=(fade**0.38, fade**0.15),
+        chromophores_low=tuple(a.low for a in axes), chromophores_high=tuple(a.high for a in axes),
+        roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
+        transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
+        environment_entry=light.entry_of_the_sky(), environment_levels=0, environment=look.environment,
+        irradiance_sh=stage.environment,
+    )  # fmt: skip
+    stage.head.render()
+
+
+SUN = np.array([1.0, 0.965, 0.9])
+"""Color of the directional light, linear ACEScg."""
+
+
+def _scatter(stage: Stage, look: Look, camera: scene.Camera, other: str, scissor: tuple[int, int, int, int]) -> None:
+    program, targets, buffer = stage.gather.program, stage.targets, stage.targets["scattered_buffer"]
+    tables = stage.uploaded
+    if other == "burley":
+        tables = _one_burley(stage)
+    elif other == "set" and "other" in stage.targets:
+        tables = stage.targets["other"]
+    taps = 0 if other == "scattering" else TAPS[look.tier]
+    frames = REFERENCE_FRAMES if look.tier == "reference" and taps else 1
+    context = gl.context()
+    context.enable_only(moderngl.BLEND if frames > 1 else moderngl.NOTHING)
+    context.blend_func = moderngl.ONE, moderngl.ONE
+    buffer.use()
+    buffer.scissor = scissor
+    buffer.clear(0.0, 0.0, 0.0, 0.0)
+    gl.bind(program, entering=targets["entering"], facing=targets["facing"], skin=targets["skin"],
+            behind=targets["reflected"], detail=targets["detail"], lut_color=tables.color, lut_rings=tables.rings,
+            lut_encircled=tables.encircled)  # fmt: skip
+    gl.put(program, focal=camera.focal_pixels * SAMPLES, center=tuple(n * SAMPLES / 2 for n in stage.size), taps=taps,
+           sun=tuple(look.light * SUN / np.pi), gain=1 / frames)  # fmt: skip
+    for frame in range(frames):
+        gl.put(program, frame=frame)
+        stage.gather.array.render()
+    buffer.scissor = None
+
+
+def _one_burley(stage: Stage) -> textures.LutTextures:
+    """Tables in which one Burley, fitted to very light skin, stands for every tone."""
+    if stage.burley is None:
+        rings, within = textures.burley_tables(stage.luts, _LIGHT_SKIN)
+        stage.burley = replace(stage.uploaded, rings=gl.volume(rings), encircled=gl.volume(within))
+    return stage.burley
+
+
+def _compose(stage: Stage, look: Look) -> None:
+    program, buffer = stage.compose.program, stage.targets["pixel_buffer"]
+    gl.context().enable_only(moderngl.NOTHING)
+    buffer.use()
+    gl.bind(program, scattered=stage.targets["scattered"], reflected_light=stage.targets["reflected"])
+    gl.put(program, srgb_from_acescg=color.from_acescg(np.eye(3), "srgb").T, exposure=2.0**look.exposure,
+           samples=SAMPLES)  # fmt: skip
+    stage.compose.array.render()
+
+
+def pixels(stage: Stage) -> np.ndarray:
+    """The frame as 8-bit sRGB [height, width, 3], first row on top."""
+    return gl.read(stage.targets["pixel_buffer"], kind="f1", components=3)[::-1]
+
+
+def release(stage: Stage) -> None:
+    """Free everything that the stage holds on the GPU."""
+    for thing in (*stage.targets.values(), *stage.maps.values()):
+        thing.release()
+    for tables in (stage.uploaded, stage.burley):
+        if tables is not None:
+            for texture in (tables.color, tables.rings, tables.encircled):
+                texture.release()

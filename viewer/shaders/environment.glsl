@@ -1,0 +1,29 @@
+// Light from all around, linear ACEScg: a studio of three soft boxes, or an equirectangular picture with mips.
+uniform sampler2D environment_map;
+uniform int environment_levels;   // mip levels of environment_map; 0: the studio
+uniform float environment;        // gain
+uniform vec3 irradiance_sh[9];    // cosine-convolved harmonics of the same light, order 2
+
+vec3 studio(vec3 d, float roughness) {
+    vec3 light = mix(vec3(0.088, 0.083, 0.080), vec3(0.29, 0.31, 0.335), smoothstep(-0.6, 0.9, d.y));
+    for (int i = 0; i < STUDIO_LOBES; i++) {
+        float sharp = STUDIO_SHARPNESS[i] / (1.0 + 1.6 * STUDIO_SHARPNESS[i] * roughness * roughness);
+        light += STUDIO_COLOR[i] * (sharp / STUDIO_SHARPNESS[i]) * exp(sharp * (dot(d, STUDIO_DIRECTION[i]) - 1.0));
+    }
+    return light;
+}
+
+vec3 reflected(vec3 d, float roughness) {
+    if (environment_levels == 0) return environment * studio(d, roughness);
+    vec2 at = vec2(atan(d.x, -d.z) / 6.28318531 + 0.5, acos(clamp(d.y, -1.0, 1.0)) / 3.14159265);
+    return environment * textureLod(environment_map, at, sqrt(roughness) * float(environment_levels - 3)).rgb;
+}
+
+// Irradiance from the hemisphere around n (Ramamoorthi & Hanrahan 2001).
+vec3 irradiance(vec3 n) {
+    vec3 e = irradiance_sh[0] * 0.282095 + 0.488603 * (irradiance_sh[1] * n.y + irradiance_sh[2] * n.z + irradiance_sh[3] * n.x)
+        + 1.092548 * (irradiance_sh[4] * n.x * n.y + irradiance_sh[5] * n.y * n.z + irradiance_sh[7] * n.x * n.z)
+        + irradiance_sh[6] * 0.315392 * (3.0 * n.z * n.z - 1.0)
+        + irradiance_sh[8] * 0.546274 * (n.x * n.x - n.y * n.y);
+    return environment * max(e, vec3(0.0));
+}

@@ -1,0 +1,5 @@
+#version 330
+uniform mat4 light_clip;
+in vec3 position;
+
+void main() { gl_Position = light_clip * vec4(position, 1.0); }

@@ -1,0 +1,67 @@
+#version 330
+// First pass over the head: light that enters the skin, what the skin is, and the light that does not enter.
+#include "constants.glsl"
+#include "environment.glsl"
+#include "specular.glsl"
+uniform sampler2D normal_map, chromophore_map, surface_map, detail_map, shadow_map;
+uniform vec3 light_direction, light_color, eye;
+uniform vec3 chromophores;        // melanin, eumelanin, hemoglobin: what the maps multiply
+uniform vec3 chromophores_low, chromophores_high;  // what the LUT set covers
+uniform vec2 contrast;            // exponents of the melanin and hemoglobin ratios: freckles fade on dark skin
+uniform float roughness, specular, bumps, entry, transmission, light_radius, shadow_bias, environment_entry;
+in vec3 view_position, view_normal, world_position, world_normal;
+in vec2 texcoord;
+in vec3 light_position;
+layout(location = 0) out vec4 entering;     // rgb: irradiance that enters; a: view depth in mm, 0 where there is no head
+layout(location = 1) out vec4 facing;       // rgb: view-space geometric normal; a: exit factor of the skin seen there
+layout(location = 2) out vec4 skin;         // melanin, eumelanin, hemoglobin; a: thickness in mm
+layout(location = 3) out vec4 reflected_light;  // rgb: specular; a: light on the far side of a thin part
+layout(location = 4) out vec4 detail;       // rgb: painted detail times albedo
+
+float noise(vec2 p) { return fract(52.9829189 * fract(dot(p, vec2(0.06711056, 0.00583715)))); }
+
+float lit(float facing_light) {
+    float angle = noise(gl_FragCoord.xy) * 6.2831853, sum = 0.0;
+    vec2 offset = vec2(cos(angle), sin(angle));
+    for (int i = 0; i < 16; i++) {
+        vec2 at = light_position.xy + offset * sqrt((float(i) + 0.5) / 16.0) * light_radius;
+        offset = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * offset;
+        sum += step(light_position.z - shadow_bias, textureLod(shadow_map, at, 0.0).r);
+    }
+    return sum / 16.0 * smoothstep(0.0, 0.12, facing_light);
+}
+
+vec3 bumped(vec3 n) {
+    vec3 dx = dFdx(world_position), dy = dFdy(world_position), across = cross(dy, n), along = cross(n, dx);
+    vec2 ux = dFdx(texcoord), uy = dFdy(texcoord);
+    vec3 t = across * ux.x + along * uy.x, b = across * ux.y + along * uy.y;
+    float scale = inversesqrt(max(max(dot(t, t), dot(b, b)), 1e-20));
+    vec3 tangent = texture(normal_map, texcoord).xyz * 2.0 - 1.0;
+    tangent = normalize(vec3(tangent.xy * bumps, max(tangent.z, 0.2)));
+    return normalize(t * scale * tangent.x + b * scale * tangent.y + n * tangent.z);
+}
+
+void main() {
+    vec3 geometric = normalize(world_normal), n = bumped(geometric), v = normalize(eye - world_position);
+    float nv = max(dot(n, v), 1e-3), nl = max(dot(n, light_direction), 0.0);
+    vec4 surface = texture(surface_map, texcoord);  // roughness and specular ratio, occlusion, thickness / 32 mm
+    float open = surface.z, shadow = lit(dot(geometric, light_direction));
+    vec3 sun = light_color * shadow;
+
+    vec3 sky = irradiance(n) * pow(vec3(open), vec3(0.8, 1.0, 1.05)) * mix(1.0, environment_entry, entry);
+    entering = vec4(sun * nl * mix(1.0, entry_factor(nl), entry) + sky, -view_position.z);
+    facing = vec4(normalize(view_normal), mix(1.0, (1.0 - fresnel(nv)) / EXIT_MEAN, entry));
+
+    vec3 ratio = texture(chromophore_map, texcoord).xyz;
+    ratio.xz = pow(ratio.xz, contrast);
+    skin = vec4(clamp(chromophores * ratio, chromophores_low, chromophores_high), surface.w * 32.0);
+    detail = texture(detail_map, texcoord);
+
+    float rough = clamp(roughness * surface.x, 0.15, 1.0), grazing = clamp(pow(nv + open, exp2(-16.0 * rough - 1.0)) - 1.0 + open, 0.0, 1.0);
+    vec3 mirror = reflect(-v, n);
+    vec3 around = mix(reflected(mirror, rough) * environment_lobe(nv, rough),
+                      reflected(mirror, rough * SECOND_LOBE) * environment_lobe(nv, rough * SECOND_LOBE), SECOND_WEIGHT);
+    vec3 gloss = sun * specular_lobes(n, v, light_direction, rough) + grazing * mix(1.0, 0.6, pow(1.0 - nv, 2.0)) * around;
+    float behind = transmission * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0);
+    reflected_light = vec4(specular * surface.y * gloss, behind);
+}
