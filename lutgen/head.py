@@ -75,7 +75,7 @@ def _make() -> dict[str, np.ndarray]:
     whole = np.concatenate([np.arange(len(positions)), again])
     u = np.concatenate([u, u[again] + 1])
     margin = 0.03  # u runs a little beyond 0 to 1 at the seam
-    u = (u + margin) / (1 + 2 * margin)
+    u = np.clip((u + margin) / (1 + 2 * margin), 0, 1)  # beyond only around the pole at the crown
     v = (positions[whole, 1] - _FLOOR_MM) / _HEIGHT_MM
     return {
         "positions": positions[whole].astype("f4"), "normals": normals[whole].astype("f4"),
@@ -85,7 +85,7 @@ def _make() -> dict[str, np.ndarray]:
 
 
 def _surroundings(positions, normals, values, lines) -> tuple[np.ndarray, np.ndarray]:
-    """Share of the sky that each vertex sees, cosine-weighted, and the thickness under it in mm, by sampled distances."""
+    """Share of the sky that each vertex sees, cosine-weighted, and the thickness under it in mm."""
     i = np.arange(_RAYS) + 0.5
     turn, height = i * 2.39996323, np.sqrt(1 - i / _RAYS)  # cosine-weighted around +z
     ways = np.stack([np.sqrt(i / _RAYS) * np.cos(turn), np.sqrt(i / _RAYS) * np.sin(turn), height], axis=1)
@@ -197,26 +197,27 @@ def _paint(shape: Mesh) -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
+FLUSHED = (
+    (1.0, (38, -28, 62), 15), (1.1, (0, -36, 108), 10), (0.8, (13, -40, 95), 7), (0.5, (0, -94, 88), 13),
+    (0.7, (31, -10, 74), 10), (0.3, (0, 45, 75), 22),
+)  # fmt: skip
+"""Where more blood runs (share more, place and radius in mm): cheeks, tip and wings of the nose, chin, lids, brow."""
+
+
 def _pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Ratios of melanin and hemoglobin, and how much of a lip it is, at positions [..., 3]."""
     x, y, z = np.abs(p[..., 0]), p[..., 1], p[..., 2]
-
-    def spot(center, radius: float) -> np.ndarray:
-        return np.exp(-((x - center[0]) ** 2 + (y - center[1]) ** 2 + (z - center[2]) ** 2) / (2 * radius**2))
 
     flat = tuple(v.ravel() for v in (x, y, z))
     wobble = 1.4 * _mottled(p / 3, 3, 9)
     red = np.minimum(*sculpt.lips(flat)).reshape(x.shape)
     lip = _smooth(1.6, 0.2, red + 0.6 * wobble) * (z > 60)
     in_ear = _smooth(3, -1, sculpt.ear(flat).reshape(x.shape))
-    hemoglobin = (
-        1 + spot((38, -28, 62), 15) + 1.1 * spot((0, -36, 108), 10) + 0.8 * spot((13, -40, 95), 7)
-        + 0.5 * spot((0, -94, 88), 13) + 0.7 * spot((31, -10, 74), 10) + 0.9 * in_ear + 0.3 * spot((0, 45, 75), 22)
-    )  # fmt: skip
+    hemoglobin = 1 + 0.9 * in_ear + sum(gain * _spot(p, at, size) for gain, at, size in FLUSHED)
     hemoglobin *= (1 + 0.5 * _mottled(p / 11, 4, 3) + 0.35 * _mottled(p / 3, 3, 5)) * (1 + 2.6 * lip)
-    melanin = 1 + 0.55 * _mottled(p / 16, 4, 21) + 0.3 * _mottled(p / 2.2, 3, 23) + 0.3 * spot((30, 0, 72), 13)
-    melanin += 0.25 * lip - 0.12 * spot((38, -28, 62), 16)
-    melanin *= 1 + 1.1 * _freckles(p) * np.clip(spot((24, -20, 78), 20) + spot((0, -15, 95), 14), 0, 1)
+    melanin = 1 + 0.55 * _mottled(p / 16, 4, 21) + 0.3 * _mottled(p / 2.2, 3, 23) + 0.3 * _spot(p, (30, 0, 72), 13)
+    melanin += 0.25 * lip - 0.12 * _spot(p, (38, -28, 62), 16)
+    melanin *= 1 + 1.1 * _freckles(p) * np.clip(_spot(p, (24, -20, 78), 20) + _spot(p, (0, -15, 95), 14), 0, 1)
     melanin *= 1 + 5.0 * _brows(p, wobble)
     lid = np.interp(x, [17, 23, 31, 39, 46], [-5.6, -8.4, -9.4, -8.0, -4.2])
     lashes = _smooth(15, 19, x) * _smooth(48, 44, x) * (z > 55)
@@ -224,6 +225,12 @@ def _pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     parting = np.interp(x, *np.array(sculpt.MOUTH_MM).T[:2])
     inside = np.exp(-(((y - parting) / 0.9) ** 2)) * _smooth(27, 24, x) * (z > 70)
     return np.clip(melanin * (1 + 0.8 * inside), 0.35, 12), np.clip(hemoglobin * (1 + 1.5 * inside), 0.4, 7), lip
+
+
+def _spot(p: np.ndarray, center, radius_mm: float) -> np.ndarray:
+    """A soft spot around a place and its mirror image."""
+    off = np.abs(p[..., 0]) - center[0], p[..., 1] - center[1], p[..., 2] - center[2]
+    return np.exp(-sum(v**2 for v in off) / (2 * radius_mm**2))
 
 
 def _freckles(p: np.ndarray) -> np.ndarray:

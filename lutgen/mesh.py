@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,15 +11,18 @@ from lutgen.errors import InputError, MachineError, in_range
 
 SUFFIXES = (".glb", ".gltf", ".obj")
 HEAD_MM, BUST_MM = 250.0, 380.0
-_THREE = "https://raw.githubusercontent.com/mrdoob/three.js/r187/examples/models/gltf/LeePerrySmith/"
+_LEE = "https://raw.githubusercontent.com/mrdoob/three.js/r187/examples/models/gltf/LeePerrySmith/"
 SCANS = {
     "lee-perry-smith": {
         "attribution": "Infinite, 3D Head Scan by Lee Perry-Smith, www.triplegangers.com, CC-BY 3.0",
         "mm_per_unit": 47.5,
         "files": {
-            "head": (_THREE + "LeePerrySmith.glb", "402b8a8ac9f03232e6d64b5962929703a069daf99d3c49ac8eb0e48bedc9c576"),
-            "albedo": (_THREE + "Map-COL.jpg", "e976d73b31407f8d0967412bf468019ed26a5d5a32cf5811aabff7e816458a65"),
-            "normal": (_THREE + "Infinite-Level_02_Tangent_SmoothUV.jpg", "36925e51ad9b324b94e8faf4692da1b4132809f2762bb8d5bd549ffd215d4ca6"),
+            "head": (_LEE + "LeePerrySmith.glb", "402b8a8ac9f03232e6d64b5962929703a069daf99d3c49ac8eb0e48bedc9c576"),
+            "albedo": (_LEE + "Map-COL.jpg", "e976d73b31407f8d0967412bf468019ed26a5d5a32cf5811aabff7e816458a65"),
+            "normal": (
+                _LEE + "Infinite-Level_02_Tangent_SmoothUV.jpg",
+                "36925e51ad9b324b94e8faf4692da1b4132809f2762bb8d5bd549ffd215d4ca6",
+            ),
         },
     }
 }  # fmt: skip
@@ -168,8 +170,3 @@ def _fetch(url: str, sha256: str) -> Path:
     except Exception as error:  # pooch passes on what requests and the disk raise
         reason = " ".join(str(error).split())[:120]
         raise MachineError(f"{url}: cannot be fetched ({reason}); get it yourself and give --mesh FILE") from error
-
-
-def digest(path: Path) -> str:
-    """SHA-256 of a file."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()

@@ -7,9 +7,12 @@ published means of adults (breadth of head 152, length 197, bizygomatic 140, fac
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-Points = tuple[np.ndarray, np.ndarray, np.ndarray]
+Points = tuple[np.ndarray, ...]
+"""x, y and z of points, arrays of one shape."""
 BUST_MM = -200.0
 """Height at which the neck and shoulders are cut."""
 
@@ -36,7 +39,7 @@ def _turned(p: Points, about: str, degrees: float) -> Points:
 
 
 def _from(p: Points, center) -> Points:
-    return tuple(v - np.float32(c) for v, c in zip(p, center, strict=True))  # type: ignore[return-value]
+    return tuple(v - np.float32(c) for v, c in zip(p, center, strict=True))
 
 
 def _ellipsoid(p: Points, center, radii, **turns: float):
@@ -176,7 +179,7 @@ def distance(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return _join(d, ear(p), 6)
 
 
-def _steps(low: float, high: float, fine: list[tuple[float, float, float]], coarse: float = 4.0) -> np.ndarray:
+def _steps(low: float, high: float, fine: Sequence[tuple[float, float, float]], coarse: float = 4.0) -> np.ndarray:
     """Grid lines with a spacing of its own in each (from, to, spacing)."""
     lines = [low]
     while lines[-1] < high:
@@ -205,7 +208,7 @@ def sampled(lines: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
 def surface_nets(values: np.ndarray, lines) -> tuple[np.ndarray, np.ndarray]:
     """Vertices [V, 3] and triangles [T, 3] of the zero level of a grid (Gibson 1998), outward.
 
-    One vertex in each cell that the surface crosses, at the mean of its edge crossings; a quad around each crossed edge.
+    A vertex in each cell that the surface crosses, at the mean of its edge crossings; a quad around each such edge.
     """
     inside = values < 0
     shape = np.array(values.shape) - 1

@@ -15,19 +15,20 @@ import lutgen
 ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"cli"},
-    {"commands", "benchmark", "checking"},
+    {"commands", "benchmark", "checking", "showing"},
     {"charts"},
     {"baking"},
     {"solvers"},
-    {"probing"},
+    {"probing", "head", "maps"},
     {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
-    {"config", "scene", "paths", "profiles", "quadrature", "burley"},
+    {"config", "scene", "glsl", "mesh", "sculpt", "paths", "profiles", "quadrature", "burley"},
     {"axes", "tissue", "color"},
     {"chromophores"},
     {"errors"},
 ]
 HEAVY = {
     "pyopencl": {"device"}, "OpenEXR": {"exr"}, "colour": {"data"}, "scipy": {"data"}, "matplotlib": {"charts"},
+    "trimesh": {"mesh"}, "pooch": {"mesh"}, "moderngl": set(), "glfw": set(), "imgui_bundle": set(),
 }  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from lutgen.errors import MachineError
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install -y libegl1 libgl1-mesa-dri"
 _CONTEXTS: list[moderngl.Context] = []
+_DEFAULT: list[moderngl.Framebuffer] = []
 
 
 def context() -> moderngl.Context:
@@ -112,6 +113,15 @@ def read(target: moderngl.Framebuffer, attachment: int = 0, kind: str = "f4", co
     width, height = target.size
     raw = target.read(components=components, attachment=attachment, dtype=kind, alignment=1)
     return np.frombuffer(raw, {"f4": "f4", "f1": "u1", "f2": "f2"}[kind]).reshape(height, width, components)
+
+
+def free(*things) -> None:
+    """Release OpenGL objects; a framebuffer in use is left first, for the next one would find it gone."""
+    if not _DEFAULT:
+        _DEFAULT.append(context().detect_framebuffer(0))
+    _DEFAULT[0].use()
+    for thing in things:
+        thing.release()
 
 
 def check() -> None:

@@ -79,23 +79,37 @@ def entry_of_the_sky() -> float:
     return exit_mean() / float(1 - fresnel(np.ones(1))[0])
 
 
-def ggx_albedo(size: int = 32, samples: int = 96) -> np.ndarray:
+def ggx_albedo(size: int = 32, samples: int = 48) -> np.ndarray:
     """Directional albedo [roughness, root of cosine, 2] of one GGX lobe: at F = 1, and weighted with (1 - v.h)^5.
 
-    Height-correlated Smith visibility; half vectors drawn by the distribution on a regular grid (Walter et al. 2007).
+    Height-correlated Smith masking, visible normals drawn on a regular grid (Heitz 2018): weights G2 / G1 <= 1.
     """
     u, v = np.stack(np.meshgrid(*2 * [(np.arange(samples) + 0.5) / samples])).reshape(2, -1)
+    r, turn = np.sqrt(u), 2 * np.pi * v
     table = np.zeros((size, size, 2))
     for i, roughness in enumerate(np.linspace(0, 1, size)):
-        a2 = max(roughness, 0.02) ** 4
-        cos_h = np.sqrt((1 - u) / (1 + (a2 - 1) * u))
-        sin_h, turn = np.sqrt(1 - cos_h**2), 2 * np.pi * v
+        alpha = max(roughness, 0.02) ** 2
         for j, c in enumerate(np.linspace(0, 1, size) ** 2):  # close at grazing, where it is steep
             nv = max(c, 1e-3)
-            vh = np.sqrt(1 - nv * nv) * sin_h * np.cos(turn) + nv * cos_h
-            nl = 2 * vh * cos_h - nv
-            ok = (nl > 0) & (vh > 0)
-            smith = 0.5 / (nl * np.sqrt(nv * nv * (1 - a2) + a2) + nv * np.sqrt(nl * nl * (1 - a2) + a2) + 1e-9)
-            weight = np.where(ok, 4 * smith * nl * vh / np.maximum(cos_h, 1e-9), 0)
+            view = np.array([np.sqrt(1 - nv * nv), 0.0, nv])
+            seen = view * [alpha, alpha, 1.0]
+            seen /= np.linalg.norm(seen)
+            across = np.array([0.0, 1.0, 0.0])
+            along = np.cross(seen, across)
+            s = 0.5 * (1 + seen[2])
+            x = r * np.cos(turn)
+            y = (1 - s) * np.sqrt(1 - x * x) + s * r * np.sin(turn)
+            half = x[:, None] * across + y[:, None] * along + np.sqrt(np.maximum(1 - x * x - y * y, 0))[:, None] * seen
+            half = half * [alpha, alpha, 1.0]
+            half /= np.linalg.norm(half, axis=1, keepdims=True)
+            vh = half @ view
+            nl = 2 * vh * half[:, 2] - nv
+            masked, shadowed = (_smith(k, alpha) for k in (np.array(nv), np.maximum(nl, 1e-6)))
+            weight = np.where(nl > 0, (1 + masked) / (1 + masked + shadowed), 0)
             table[i, j] = weight.mean(), (weight * (1 - np.clip(vh, 0, 1)) ** 5).mean()
     return table
+
+
+def _smith(cosine: np.ndarray, alpha: float) -> np.ndarray:
+    """Smith's Lambda of GGX: hidden per visible microfacet area (Heitz 2014)."""
+    return (np.sqrt(1 + alpha**2 * (1 - cosine**2) / cosine**2) - 1) / 2

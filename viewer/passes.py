@@ -39,7 +39,7 @@ class Stage:
     compose: gl.Pass
     head: moderngl.VertexArray
     head_shadow: moderngl.VertexArray
-    indices: int
+    buffers: tuple
     center_mm: np.ndarray
     radius_mm: float
     maps: dict
@@ -71,7 +71,7 @@ def open_stage(mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int,
     ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
     stage = Stage(
         size, luts, uploaded, None, surface, shadow, gl.full_screen("gather.frag.glsl", made),
-        gl.full_screen("compose.frag.glsl"), head, cast, mesh.triangles.size, center,
+        gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
         light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx, {},
@@ -103,8 +103,7 @@ def set_map(stage: Stage, name: str, values: np.ndarray | None) -> None:
 
 def resize(stage: Stage, size: tuple[int, int]) -> None:
     """Make the targets of a frame of that size in pixels."""
-    for target in stage.targets.values():
-        target.release()
+    gl.free(*stage.targets.values())
     context, large = gl.context(), (size[0] * SAMPLES, size[1] * SAMPLES)
     names = "entering", "facing", "skin", "reflected", "detail"
     layers = {name: gl.texture(large, 4, "f4" if name in ("entering", "skin") else "f2") for name in names}
@@ -241,9 +240,10 @@ def pixels(stage: Stage) -> np.ndarray:
 
 def release(stage: Stage) -> None:
     """Free everything that the stage holds on the GPU."""
-    for thing in (*stage.targets.values(), *stage.maps.values()):
-        thing.release()
-    for tables in (stage.uploaded, stage.burley):
-        if tables is not None:
-            for texture in (tables.color, tables.rings, tables.encircled):
-                texture.release()
+    tables = [t for t in (stage.uploaded, stage.burley) if t is not None]
+    shared = {id(t): t for group in tables for t in (group.color, group.rings, group.encircled)}
+    gl.free(
+        *stage.targets.values(), *stage.maps.values(), *shared.values(), stage.environment_map, stage.ggx, stage.head,
+        stage.head_shadow, stage.surface, stage.shadow, *stage.buffers,
+        *(part for law in (stage.gather, stage.compose) for part in (law.array, law.program, law.corners)),
+    )  # fmt: skip

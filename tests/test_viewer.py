@@ -1,0 +1,201 @@
+"""The viewer's pictures: skin that follows the sliders, the same pixels every time, nothing left behind on the GPU."""
+
+import gc
+import importlib
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import lutgen
+from lutgen import head, scene
+from lutgen.cli import main
+from lutgen.maps import Maps
+from lutgen.mesh import Mesh
+from lutgen.scene import Look
+
+app, gl, passes, textures = (importlib.import_module(f"lutgen.viewer.{n}") for n in ("app", "gl", "passes", "textures"))
+SIZE = (160, 160)
+
+
+@pytest.fixture(scope="module")
+def stage():
+    shape = head.builtin()
+    made = app.open_stage(lutgen.load(), shape, Maps(**head.paint(shape)), SIZE)
+    yield made
+    passes.release(made)
+    gl.check()
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """A square meter facing the camera, without maps."""
+    corners = np.array([[-500, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]], "f4")
+    normals = np.tile(np.array([0, 0, 1], "f4"), (4, 1))
+    square = Mesh(corners, normals, None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
+    made = app.open_stage(lutgen.load(), square, Maps(), SIZE)
+    yield made
+    passes.release(made)
+
+
+def face(stage, look) -> np.ndarray:
+    """Mean display color of the middle of the face."""
+    return app.picture(stage, look)[50:110, 60:100].reshape(-1, 3).mean(axis=0)
+
+
+LOOK = Look(distance_mm=500, target_mm=(0, -20, 0), azimuth=0)
+
+
+def test_melanin_darkens_and_lost_oxygen_turns_blue(stage):
+    light, dark = (face(stage, replace(LOOK, melanin=m)) for m in (0.01, 0.2))
+    assert np.all(dark < 0.8 * light)
+    pale = replace(LOOK, melanin=0.008, hemoglobin=0.03)
+    red, blue = (face(stage, replace(pale, oxygenation=o)) for o in (1.0, 0.0))
+    assert red[0] - red[2] > blue[0] - blue[2] + 5
+
+
+def test_the_same_look_gives_the_same_pixels(stage):
+    first = app.picture(stage, LOOK)
+    app.picture(stage, replace(LOOK, melanin=0.3, oxygenation=0.2, split="burley"))
+    assert np.array_equal(app.picture(stage, LOOK), first)
+
+
+@pytest.mark.parametrize("tier", scene.TIERS)
+def test_every_tier_draws_a_face(stage, tier):
+    assert face(stage, replace(LOOK, tier=tier)).min() > 20
+
+
+def test_split_views_differ_on_the_right_only(stage):
+    whole = app.picture(stage, LOOK).astype(int)
+    for split in ("scattering", "burley"):
+        halves = app.picture(stage, replace(LOOK, split=split)).astype(int)
+        assert np.array_equal(halves[:, : SIZE[0] // 2], whole[:, : SIZE[0] // 2])
+        assert np.abs(halves - whole)[:, SIZE[0] // 2 :].max() > 4
+
+
+def linear(stage, look) -> np.ndarray:
+    """Scattered light [H, W, 3] before exposure, ACEScg."""
+    app.picture(stage, look)
+    return gl.read(stage.targets["scattered_buffer"])[..., :3]
+
+
+@pytest.mark.parametrize("tier", ["off", "high"])
+def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
+    """Without the entry factor a directional light of irradiance pi along the normal gives the LUT's own color."""
+    look = Look(entry=0, environment=0, light=np.pi, light_azimuth=0, light_elevation=0, azimuth=0, elevation=0,
+                distance_mm=300, tier=tier, transmission=0)  # fmt: skip
+    found = linear(plain, look)[140:180, 140:180]
+    expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * passes.SUN
+    assert np.abs(found / expected - 1).max() < 0.005
+
+
+def test_thin_parts_let_light_through(plain):
+    """Lit from behind, a thin sheet glows red and a thick one does not."""
+    look = Look(environment=0, light=10, light_azimuth=180, light_elevation=0, azimuth=0, elevation=0, distance_mm=300)
+    seen = []
+    for thickness in (1.0, 31.0):
+        surface = np.ones((1, 1, 4), "f4")
+        surface[..., 3] = thickness / 32
+        passes.set_map(plain, "surface", surface)
+        seen.append(linear(plain, look)[160, 160])
+    passes.set_map(plain, "surface", None)
+    assert seen[0][0] > 5 * seen[0][2] > 0
+    assert seen[1].max() < 0.01 * seen[0][0]
+
+
+def test_maps_change_the_skin_where_they_are(plain):
+    base = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
+    passes.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
+    darker = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
+    passes.set_map(plain, "chromophores", None)
+    again = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
+    assert np.all(darker[100:200, 100:200] < 0.9 * base[100:200, 100:200])
+    assert np.array_equal(again, base)
+
+
+def test_oxygenation_reaches_the_textures_in_time(stage):
+    """50 ms from slider to texture are promised; the expansion and the upload are timed by `lutgen bench --viewer`."""
+    passes.set_oxygenation(stage, 0.2)
+    color, _, _ = textures.tables(lutgen.load().expand(oxygenation=0.2))
+    held = np.frombuffer(stage.uploaded.color.read(), "f4").reshape(color.shape)
+    assert np.abs(held - color).max() < 1e-6
+    passes.set_oxygenation(stage, 0.7)
+
+
+def test_nothing_is_left_on_the_gpu():
+    """Objects of a stage that was opened, drawn, resized and released."""
+    shape, luts = head.builtin(), lutgen.load()
+
+    def alive() -> int:
+        gc.collect()
+        kinds = ("Texture", "Texture3D", "Buffer", "Program", "VertexArray", "Framebuffer", "Renderbuffer")
+        return sum(type(o).__name__ in kinds and type(o).__module__ == "moderngl" and not _released(o)
+                   for o in gc.get_objects())  # fmt: skip
+
+    gl.free()
+    before = alive()
+    for _ in range(2):
+        made = app.open_stage(luts, shape, Maps(), (32, 32))
+        app.picture(made, Look(split="burley"))
+        passes.resize(made, (48, 16))
+        assert app.picture(made, Look()).shape == (16, 48, 3)
+        passes.release(made)
+    gl.check()
+    assert alive() == before
+
+
+def _released(thing) -> bool:
+    return type(thing.mglo).__name__ == "InvalidObject"
+
+
+def test_screenshot_and_sheet_commands(tmp_path, capsys):
+    out = tmp_path / "view.png"
+    assert (
+        main(["view", "--screenshot", str(out), "--size", "96x64", "--preset", "dark", "--set", "azimuth=30", "--json"])
+        == 0
+    )
+    said = json.loads(capsys.readouterr().out)
+    assert said["size"] == [96, 64]
+    assert said["look"]["melanin"] == lutgen.preset("dark").melanin
+    with Image.open(out) as picture:
+        assert picture.size == (96, 64)
+    assert main(["sheet", "--out", str(tmp_path / "sheet.png"), "--size", "48x48"]) == 0
+    with Image.open(tmp_path / "sheet.png") as picture:
+        assert picture.size == (144, 144)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["--set", "melanin=nan"], 2, "melanin = nan"),
+        (["--set", "melanin"], 2, "NAME=VALUE is needed"),
+        (["--preset", "pale"], 2, "preset = 'pale'"),
+        (["--mesh", "none.glb"], 2, "none.glb: there is no such file"),
+        (["--maps", "nowhere"], 2, "maps = nowhere: there is no such folder"),
+        (["--size", "9x9"], 2, "allowed is 16 to 4096"),
+        (["--size", "wide"], 2, "for example 640x360"),
+        (["--look", "none.toml"], 2, "look none.toml: cannot be read"),
+        (["nowhere"], 2, "nowhere"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, status, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["view", "--screenshot", "out.png", *arguments]) == status
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_without_opengl_the_line_says_what_to_install(monkeypatch):
+    import moderngl
+
+    def refuse(**options):
+        raise Exception("no display\nat all")
+
+    monkeypatch.setattr(gl, "_CONTEXTS", [])
+    monkeypatch.setattr(moderngl, "create_context", refuse)
+    with pytest.raises(lutgen.MachineError, match=r"no OpenGL 3.3 \(no display at all\).*apt-get install -y libegl1"):
+        gl.context()
