@@ -78,7 +78,7 @@ def _parser() -> argparse.ArgumentParser:
     chart.set_defaults(run="lutgen.commands.chart")
     stability.set_defaults(run="lutgen.commands.stability")
 
-    view = commands.add_parser("view", help="a face that changes skin as sliders move, or a picture of it")
+    view = commands.add_parser("view", help="a picture of a face, shaded from a LUT set")
     sheet = commands.add_parser("sheet", help="a picture of every preset on a head")
     for command in (view, sheet):
         command.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
@@ -89,7 +89,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--preset", help="chromophores of a preset: light, dark, ...")
         command.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one value of the look")
         command.add_argument("--size", default=None, help="pixels: 640x360")
-    view.add_argument("--screenshot", metavar="FILE", help="write a picture instead of opening a window")
+    view.add_argument("--screenshot", required=True, metavar="FILE", help="picture to write")
     view.set_defaults(run="lutgen.commands.view")
     sheet.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
     sheet.set_defaults(run="lutgen.commands.sheet")

@@ -249,7 +249,7 @@ def _drawn(options: Namespace, draw: Callable[..., dict[str, str]]) -> Outcome:
 
 
 def view(options: Namespace) -> Outcome:
-    """`lutgen view`: the viewer, or with --screenshot one picture of it."""
+    """`lutgen view`: one picture of a head."""
     from lutgen import showing
 
     return showing.view(options)

@@ -172,7 +172,7 @@ def _noise(p: np.ndarray, seed: int) -> np.ndarray:
 
 def _mottled(p: np.ndarray, octaves: int, seed: int) -> np.ndarray:
     """Noise of several scales around 0."""
-    return sum(0.5**k * (_noise(p * 2**k, seed + k) - 0.5) for k in range(octaves))
+    return np.sum([0.5**k * (_noise(p * 2**k, seed + k) - 0.5) for k in range(octaves)], axis=0)
 
 
 def _smooth(low: float, high: float, x: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ published means of adults (breadth of head 152, length 197, bizygomatic 140, fac
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 
@@ -73,11 +74,8 @@ def _curve(p: Points, points, radii):
     a, b, c, d = (padded[k + i] for i in range(4))
     line = 0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3)
     thick = np.interp(at, np.arange(len(points)), radii)
-    found = None
-    for i in range(len(line) - 1):
-        part = _rod(p, line[i], line[i + 1], thick[i], thick[i + 1])
-        found = part if found is None else np.minimum(found, part)
-    return found
+    rods = (_rod(p, line[i], line[i + 1], thick[i], thick[i + 1]) for i in range(len(line) - 1))
+    return reduce(np.minimum, rods)
 
 
 def _skull(p: Points):

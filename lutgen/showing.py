@@ -1,4 +1,4 @@
-"""What `lutgen view` and `lutgen sheet` do: options in, the viewer or a picture out."""
+"""What `lutgen view` and `lutgen sheet` do: options in, a picture out."""
 
 from __future__ import annotations
 
@@ -65,13 +65,10 @@ def _write(pixels: np.ndarray, path: str) -> None:
 
 
 def view(options: Namespace) -> Outcome:
-    """Open the window, or draw one picture without one."""
+    """Draw one picture."""
     look = look_of(options)
     app, luts, shape, given, size = _stage(options, PICTURE_SIZE)
     said = [*shape.notes, *([shape.attribution] if shape.attribution != "built-in" else [])]
-    if options.screenshot is None:
-        _viewer("window").run(luts, shape, given, look, size)
-        return {"look": asdict(look), "notes": said}, "\n".join(said), 0
     _write(app.picture(app.open_stage(luts, shape, given, size), look), options.screenshot)
     text = "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *said])
     return {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": said}, text, 0

@@ -1,4 +1,4 @@
-"""The viewer: a head on screen or, without a window, in a picture; both by the same passes."""
+"""A head, its maps and a LUT set to pictures, without a window."""
 
 from __future__ import annotations
 
