@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lutgen import head, mesh, sculpt
+from lutgen import head, mesh, painting, sculpt
 
 
 @pytest.fixture(scope="module")
@@ -12,7 +12,7 @@ def shape(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LUTGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
         made = head.builtin()
-        yield made, head.paint(made)
+        yield made, painting.paint(made)
 
 
 def merged(shape: mesh.Mesh) -> np.ndarray:
@@ -92,7 +92,7 @@ def texel(shape: mesh.Mesh, near) -> tuple[int, int]:
     """Row and column of the map texel of the vertex nearest to a place."""
     k = np.linalg.norm(shape.positions_mm - near, axis=1).argmin()
     assert shape.uv is not None
-    u, v = shape.uv[k] * head.MAP_SIZE
+    u, v = shape.uv[k] * painting.MAP_SIZE
     return int(v), int(u)
 
 
@@ -118,7 +118,7 @@ def test_no_seam_shows(shape):
     _, place, count = np.unique(np.round(made.positions_mm, 4), axis=0, return_inverse=True, return_counts=True)
     doubled = np.flatnonzero(count[place.ravel()] > 1)
     assert len(doubled) > 50
-    at = np.clip((made.uv[doubled] * head.MAP_SIZE).astype(int), 0, head.MAP_SIZE - 1)
+    at = np.clip((made.uv[doubled] * painting.MAP_SIZE).astype(int), 0, painting.MAP_SIZE - 1)
     values = maps["chromophores"][at[:, 1], at[:, 0]]
     for k in np.unique(place.ravel()[doubled]):
         pair = values[place.ravel()[doubled] == k]
@@ -134,12 +134,12 @@ def test_the_cache_is_used_mended_and_not_needed(shape, tmp_path, monkeypatch):
         return {"a": np.arange(3)}
 
     for _ in range(2):
-        assert head._cached("thing", made)["a"].tolist() == [0, 1, 2]
+        assert head.cached("thing", made)["a"].tolist() == [0, 1, 2]
     assert len(calls) == 1
     (path,) = (tmp_path / "cache").iterdir()
     path.write_bytes(b"damaged")
-    assert head._cached("thing", made)["a"].tolist() == [0, 1, 2]
+    assert head.cached("thing", made)["a"].tolist() == [0, 1, 2]
     assert len(calls) == 2
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("LUTGEN_CACHE", str(tmp_path / "file" / "below"))
-    assert head._cached("thing", made)["a"].tolist() == [0, 1, 2]
+    assert head.cached("thing", made)["a"].tolist() == [0, 1, 2]

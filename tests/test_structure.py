@@ -19,10 +19,11 @@ LEVELS = [
     {"charts"},
     {"baking"},
     {"solvers"},
+    {"painting"},
     {"probing", "head", "maps"},
     {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
-    {"config", "scene", "glsl", "mesh", "sculpt", "paths", "profiles", "quadrature", "burley"},
-    {"axes", "tissue", "color"},
+    {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
+    {"axes", "tissue", "color", "sculpt"},
     {"chromophores"},
     {"errors"},
 ]

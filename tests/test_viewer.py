@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import lutgen
-from lutgen import head, scene
+from lutgen import head, painting, scene
 from lutgen.cli import main
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -23,7 +23,7 @@ SIZE = (160, 160)
 @pytest.fixture(scope="module")
 def stage():
     shape = head.builtin()
-    made = app.open_stage(lutgen.load(), shape, Maps(**head.paint(shape)), SIZE)
+    made = app.open_stage(lutgen.load(), shape, Maps(**painting.paint(shape)), SIZE)
     yield made
     passes.release(made)
     gl.check()

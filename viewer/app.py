@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import color, head, maps, mesh, scene
+from lutgen import color, head, maps, mesh, painting, scene
 from lutgen.errors import InputError
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
@@ -36,7 +36,7 @@ def model(name: str | None, mm_per_unit: float | None, folder: str | None) -> tu
     """The head and its maps: built-in without a name; maps from a folder, else painted where the head can be."""
     if name is None:
         shape = head.builtin()
-        given = Maps(**head.paint(shape)) if folder is None else maps.load(Path(folder))
+        given = Maps(**painting.paint(shape)) if folder is None else maps.load(Path(folder))
         return shape, given
     shape = mesh.scan(name) if name in mesh.SCANS else mesh.load(Path(name), mm_per_unit)
     found = Maps(normal=_texture(shape, "normal"), albedo=_linear(_texture(shape, "albedo")))
