@@ -119,7 +119,7 @@ def test_oxygenation_reaches_the_textures_in_time(stage):
     """50 ms from slider to texture are promised; the expansion and the upload are timed by `lutgen bench --viewer`."""
     passes.set_oxygenation(stage, 0.2)
     color, _, _ = textures.tables(lutgen.load().expand(oxygenation=0.2))
-    held = np.frombuffer(stage.uploaded.color.read(), "f4").reshape(color.shape)
+    held = np.frombuffer(stage.sides["none"].textures.color.read(), "f4").reshape(color.shape)
     assert np.abs(held - color).max() < 1e-6
     passes.set_oxygenation(stage, 0.7)
 

@@ -44,7 +44,7 @@ def scattered(stage, light, skins, mm_per_pixel, taps, frame=0):
     for name, values in zip(inputs, (entering, facing, skin, behind, flat), strict=True):
         inputs[name].write(np.ascontiguousarray(values, "f4").tobytes())
     gl.bind(law.program, lut_color=uploaded.color, lut_rings=uploaded.rings, lut_encircled=uploaded.encircled, **inputs)
-    gl.put(law.program, focal=DEPTH_MM / mm_per_pixel, center=(SIDE / 2, SIDE / 2), taps=taps, frame=frame, gain=1.0,
+    gl.put(law.program, focal=DEPTH_MM / mm_per_pixel, center=(SIDE / 2, SIDE / 2), taps=taps, frame=frame,
            sun=(0.0, 0.0, 0.0))  # fmt: skip
     target.use()
     law.array.render()

@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 
 from lutgen import color, scene
+from lutgen.errors import InputError
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
 
@@ -26,16 +27,23 @@ _LIGHT_SKIN = (0.0127, 0.7, 0.0077)
 
 
 @dataclass
+class Side:
+    """A LUT set as it is stored, as it is shown (at the look's oxygenation), on the GPU, and the pass that reads it."""
+
+    luts: LutSet
+    shown: LutSet
+    textures: textures.LutTextures
+    gather: gl.Pass
+
+
+@dataclass
 class Stage:
-    """Everything on the GPU: programs, head, maps, LUT set, targets of one size."""
+    """Everything on the GPU: programs, head, maps, LUT sets by `Look.split`, targets of one size."""
 
     size: tuple[int, int]
-    luts: LutSet
-    uploaded: textures.LutTextures
-    burley: textures.LutTextures | None
+    sides: dict[str, Side]
     surface: moderngl.Program
     shadow: moderngl.Program
-    gather: gl.Pass
     compose: gl.Pass
     head: moderngl.VertexArray
     head_shadow: moderngl.VertexArray
@@ -46,17 +54,17 @@ class Stage:
     environment: np.ndarray
     environment_map: moderngl.Texture
     ggx: moderngl.Texture
-    targets: dict
-    oxygenation: float
-    seconds: dict = field(default_factory=dict)
+    targets: dict = field(default_factory=dict)
+    oxygenation: float | None = None
 
 
-def open_stage(mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int, int]) -> Stage:
-    """Upload a head (positions_mm, normals, uv, triangles), its maps [rows, columns, channels] and a LUT set."""
+def open_stage(
+    mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int, int], other: LutSet | None = None
+) -> Stage:
+    """Upload a head (positions_mm, normals, uv, triangles), its maps [rows, columns, channels], a LUT set, another."""
     context = gl.context()
-    uploaded = textures.upload(luts)
-    made = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
-    surface = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", made))
+    constants = {"constants.glsl": light.constants()}
+    surface = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", constants))
     shadow = context.program(gl.splice("shadow.vert.glsl"), gl.splice("shadow.frag.glsl"))
     uv = mesh.uv if mesh.uv is not None else np.zeros((len(mesh.positions_mm), 2))
     vertices = np.concatenate([mesh.positions_mm, mesh.normals, uv], axis=1).astype("f4")
@@ -69,16 +77,34 @@ def open_stage(mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int,
     albedo = light.ggx_albedo().astype("f4")
     ggx = gl.texture((albedo.shape[1], albedo.shape[0]), 2, "f4", np.ascontiguousarray(albedo).tobytes())
     ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    sides = {"none": _side(luts, textures.upload(luts))}
+    if other is not None:
+        sides["set"] = _side(other, textures.upload(other))
     stage = Stage(
-        size, luts, uploaded, None, surface, shadow, gl.full_screen("gather.frag.glsl", made),
-        gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
+        size, sides, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
-        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx, {},
-        luts.oxygenation,
+        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx,
     )  # fmt: skip
     resize(stage, size)
     return stage
+
+
+def _side(luts: LutSet, uploaded: textures.LutTextures) -> Side:
+    made = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
+    return Side(luts, luts, uploaded, gl.full_screen("gather.frag.glsl", made))
+
+
+def side(stage: Stage, split: str) -> Side:
+    """What shades a side of a split view; InputError where another LUT set is asked for and none was given."""
+    if split == "burley" and split not in stage.sides:
+        plain = stage.sides["none"]
+        rings, within = textures.burley_tables(plain.luts, _LIGHT_SKIN)
+        tables = replace(plain.textures, rings=gl.volume(rings), encircled=gl.volume(within))
+        stage.sides[split] = replace(plain, textures=tables)
+    if split == "set" and split not in stage.sides:
+        raise InputError("split = set: there is no other LUT set; give one with --compare DIR")
+    return stage.sides["none" if split == "scattering" else split]
 
 
 def _map(values: np.ndarray | None, plain: tuple[float, ...]) -> moderngl.Texture:
@@ -123,22 +149,36 @@ def resize(stage: Stage, size: tuple[int, int]) -> None:
 
 def set_oxygenation(stage: Stage, oxygenation: float) -> None:
     """Expand the LUTs from their stored paths to another oxygenation and upload them."""
-    if oxygenation != stage.oxygenation:
-        textures.rewrite(stage.uploaded, *textures.tables(stage.luts.expand(oxygenation=oxygenation)))
-        stage.oxygenation = oxygenation
+    if oxygenation == stage.oxygenation:
+        return
+    for name in ("none", "set"):
+        if name in stage.sides:
+            one = stage.sides[name]
+            one.shown = one.luts if oxygenation == one.luts.oxygenation else one.luts.expand(oxygenation=oxygenation)
+            textures.rewrite(one.textures, *textures.tables(one.shown))
+    stage.oxygenation = oxygenation
 
 
-def draw(stage: Stage, look: Look) -> None:
-    """Draw one frame into the stage's pixels; a split view draws its right half as `look.split` says."""
-    set_oxygenation(stage, look.oxygenation)
-    _shadow(stage, look)
+def frames(look: Look) -> int:
+    """How many frames are added up for a look: 16 at tier `reference`, each with other taps; else one."""
+    return REFERENCE_FRAMES if look.tier == "reference" else 1
+
+
+def draw(stage: Stage, look: Look, frame: int | None = None) -> None:
+    """Draw a look into the stage's pixels; a split view draws its right half as `look.split` says.
+
+    All its frames, or one more of them: `frame` 0 starts anew, a later one adds to what is there.
+    """
     camera = scene.camera(look, *stage.size)
-    _surface(stage, look, camera)
+    if not frame:
+        set_oxygenation(stage, look.oxygenation)
+        _shadow(stage, look)
+        _surface(stage, look, camera)
     width, height = (n * SAMPLES for n in stage.size)
     halves = [(0, width)] if look.split == "none" else [(0, width // 2), (width // 2, width)]
     for k, (left, right) in enumerate(halves):
-        other = look.split if k else "none"
-        _scatter(stage, look, camera, other, (left, 0, right - left, height))
+        for one in range(frames(look)) if frame is None else (frame,):
+            _scatter(stage, look, camera, look.split if k else "none", (left, 0, right - left, height), one)
     _compose(stage, look)
     gl.check()
 
@@ -168,7 +208,7 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
             surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], shadow_map=stage.targets["cast"],
             environment_map=stage.environment_map, ggx_albedo=stage.ggx)  # fmt: skip
-    grid = stage.luts.color_lut.grid
+    grid = stage.sides["none"].luts.color_lut.grid
     axes = grid.melanin, grid.eumelanin, grid.hemoglobin
     fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
     gl.put(
@@ -189,38 +229,24 @@ SUN = np.array([1.0, 0.965, 0.9])
 """Color of the directional light, linear ACEScg."""
 
 
-def _scatter(stage: Stage, look: Look, camera: scene.Camera, other: str, scissor: tuple[int, int, int, int]) -> None:
-    program, targets, buffer = stage.gather.program, stage.targets, stage.targets["scattered_buffer"]
-    tables = stage.uploaded
-    if other == "burley":
-        tables = _one_burley(stage)
-    elif other == "set" and "other" in stage.targets:
-        tables = stage.targets["other"]
-    taps = 0 if other == "scattering" else TAPS[look.tier]
-    frames = REFERENCE_FRAMES if look.tier == "reference" and taps else 1
+def _scatter(
+    stage: Stage, look: Look, camera: scene.Camera, split: str, scissor: tuple[int, int, int, int], frame: int
+) -> None:
+    one, targets, buffer = side(stage, split), stage.targets, stage.targets["scattered_buffer"]
+    program, tables = one.gather.program, one.textures
     context = gl.context()
-    context.enable_only(moderngl.BLEND if frames > 1 else moderngl.NOTHING)
+    context.enable_only(moderngl.BLEND if frame else moderngl.NOTHING)
     context.blend_func = moderngl.ONE, moderngl.ONE
     buffer.use()
     buffer.scissor = scissor
-    buffer.clear(0.0, 0.0, 0.0, 0.0)
     gl.bind(program, entering=targets["entering"], facing=targets["facing"], skin=targets["skin"],
             behind=targets["reflected"], detail=targets["detail"], lut_color=tables.color, lut_rings=tables.rings,
             lut_encircled=tables.encircled)  # fmt: skip
-    gl.put(program, focal=camera.focal_pixels * SAMPLES, center=tuple(n * SAMPLES / 2 for n in stage.size), taps=taps,
-           sun=tuple(look.light * SUN / np.pi), gain=1 / frames)  # fmt: skip
-    for frame in range(frames):
-        gl.put(program, frame=frame)
-        stage.gather.array.render()
+    gl.put(program, focal=camera.focal_pixels * SAMPLES, center=tuple(n * SAMPLES / 2 for n in stage.size),
+           taps=0 if split == "scattering" else TAPS[look.tier], sun=tuple(look.light * SUN / np.pi),
+           frame=frame)  # fmt: skip
+    one.gather.array.render()
     buffer.scissor = None
-
-
-def _one_burley(stage: Stage) -> textures.LutTextures:
-    """Tables in which one Burley, fitted to very light skin, stands for every tone."""
-    if stage.burley is None:
-        rings, within = textures.burley_tables(stage.luts, _LIGHT_SKIN)
-        stage.burley = replace(stage.uploaded, rings=gl.volume(rings), encircled=gl.volume(within))
-    return stage.burley
 
 
 def _compose(stage: Stage, look: Look) -> None:
@@ -240,10 +266,11 @@ def pixels(stage: Stage) -> np.ndarray:
 
 def release(stage: Stage) -> None:
     """Free everything that the stage holds on the GPU."""
-    tables = [t for t in (stage.uploaded, stage.burley) if t is not None]
-    shared = {id(t): t for group in tables for t in (group.color, group.rings, group.encircled)}
+    sides = stage.sides.values()
+    volumes = {id(t): t for one in sides for t in (one.textures.color, one.textures.rings, one.textures.encircled)}
+    laws = {id(law): law for law in (stage.compose, *(one.gather for one in sides))}
     gl.free(
-        *stage.targets.values(), *stage.maps.values(), *shared.values(), stage.environment_map, stage.ggx, stage.head,
+        *stage.targets.values(), *stage.maps.values(), *volumes.values(), stage.environment_map, stage.ggx, stage.head,
         stage.head_shadow, stage.surface, stage.shadow, *stage.buffers,
-        *(part for law in (stage.gather, stage.compose) for part in (law.array, law.program, law.corners)),
+        *(part for law in laws.values() for part in (law.array, law.program, law.corners)),
     )  # fmt: skip

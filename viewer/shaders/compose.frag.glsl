@@ -35,7 +35,7 @@ void main() {
     for (int y = 0; y < samples; y++)
         for (int x = 0; x < samples; x++) {
             vec4 light = texelFetch(scattered, first + ivec2(x, y), 0);
-            vec3 linear = srgb_from_acescg * (exposure * (light.rgb + texelFetch(reflected_light, first + ivec2(x, y), 0).rgb));
+            vec3 linear = srgb_from_acescg * (exposure * (light.rgb / max(light.a, 1.0) + texelFetch(reflected_light, first + ivec2(x, y), 0).rgb));
             sum += light.a > 0.0 ? encode(clamp(tone(into_gamut(linear)), 0.0, 1.0)) : backdrop;
         }
     float grain = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715)))) - 0.5;

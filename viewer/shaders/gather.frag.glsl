@@ -17,9 +17,8 @@ uniform float focal;          // pixels per unit of x / z
 uniform vec2 center;          // of projection, in pixels
 uniform int taps;             // at most; 0: no scattering
 uniform int frame;            // another rotation and phase each
-uniform float gain;           // 1 over the frames that are added up
 in vec2 screen;
-layout(location = 0) out vec4 scattered;    // radiance, a: 1 where there is skin
+layout(location = 0) out vec4 scattered;    // radiance, a: 1 where there is skin; sums over frames
 
 const mat2 GOLDEN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
 
@@ -73,5 +72,5 @@ void main() {
     // What comes through a thin part from its far side: all light that travels farther than the part is thick.
     light += sun * texelFetch(behind, pixel, 0).a * (1.0 - encircled(own.a, place).rgb) * step(own.a, 31.9);
     float leaving = texelFetch(facing, pixel, 0).a;
-    scattered = vec4(skin_color(own.rgb) * texelFetch(detail, pixel, 0).rgb * light * leaving / 3.14159265, 1.0) * gain;
+    scattered = vec4(skin_color(own.rgb) * texelFetch(detail, pixel, 0).rgb * light * leaving / 3.14159265, 1.0);
 }
