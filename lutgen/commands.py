@@ -249,7 +249,7 @@ def _drawn(options: Namespace, draw: Callable[..., dict[str, str]]) -> Outcome:
 
 
 def view(options: Namespace) -> Outcome:
-    """`lutgen view`: one picture of a head."""
+    """`lutgen view`: a head in a window, or one picture of it."""
     from lutgen import showing
 
     return showing.view(options)

@@ -1,18 +1,19 @@
-"""What `lutgen view` and `lutgen sheet` do: options in, a picture out."""
+"""What `lutgen view` and `lutgen sheet` do: options in, a window or a picture out."""
 
 from __future__ import annotations
 
 import importlib
 from argparse import Namespace
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
-
 import lutgen
 from lutgen import manifest, scene
-from lutgen.errors import InputError, MachineError, cannot_write
+from lutgen.errors import InputError, MachineError
+from lutgen.lutset import LutSet
+from lutgen.maps import Maps
+from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
 Outcome = tuple[dict, str, int]
@@ -44,42 +45,46 @@ def look_of(options: Namespace) -> Look:
     return scene.changed(look, values)
 
 
-def _stage(options: Namespace, size: str):
-    """The stage that the options describe, and what is to be said about its head."""
-    app = _viewer("app")
-    pixels = app.size_of(options.size or size)
+@dataclass(frozen=True)
+class Scene:
+    """What the options describe: LUT sets, a head, its maps, and what is to be said about it."""
+
+    luts: LutSet
+    other: LutSet | None
+    shape: Mesh
+    given: Maps
+    said: tuple[str, ...]
+
+
+def _scene(options: Namespace, app: ModuleType) -> Scene:
     luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
+    other = None if options.compare is None else manifest.load(Path(options.compare))
     shape, given = app.model(options.mesh, options.mm_per_unit, options.maps)
-    return app, luts, shape, given, pixels
-
-
-def _write(pixels: np.ndarray, path: str) -> None:
-    from PIL import Image
-
-    try:
-        Image.fromarray(pixels).save(path)
-    except ValueError as error:
-        raise InputError(f"{path}: the name of a picture is needed, for example out.png ({error})") from error
-    except OSError as error:
-        raise cannot_write("picture", path, error) from error
+    credit = () if shape.attribution in ("", "built-in") else (shape.attribution,)
+    return Scene(luts, other, shape, given, (*shape.notes, *credit))
 
 
 def view(options: Namespace) -> Outcome:
-    """Draw one picture."""
-    look = look_of(options)
-    app, luts, shape, given, size = _stage(options, PICTURE_SIZE)
-    said = [*shape.notes, *([shape.attribution] if shape.attribution != "built-in" else [])]
-    _write(app.picture(app.open_stage(luts, shape, given, size), look), options.screenshot)
-    text = "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *said])
-    return {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": said}, text, 0
+    """Open a window, or draw one picture."""
+    look, app = look_of(options), _viewer("app")
+    size = app.size_of(options.size or PICTURE_SIZE)
+    one = _scene(options, app)
+    if options.screenshot is None:
+        look = _viewer("window").run(one.luts, one.shape, one.given, look, size, one.other, one.said)
+        said = {"look": asdict(look), "notes": list(one.said)}
+        return said, "\n".join(one.said) or "closed", 0
+    app.write(app.picture(app.open_stage(one.luts, one.shape, one.given, size, one.other), look), options.screenshot)
+    said = {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": list(one.said)}
+    return said, "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *one.said]), 0
 
 
 def sheet(options: Namespace) -> Outcome:
     """Draw every preset beside the others."""
-    look = look_of(options)
-    app, luts, shape, given, size = _stage(options, SHEET_SIZE)
-    pixels = app.sheet(app.open_stage(luts, shape, given, size), look)
-    _write(pixels, options.out)
-    said = [*shape.notes, *([shape.attribution] if shape.attribution != "built-in" else [])]
-    text = "\n".join([f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets", *said])
-    return {"sheet": options.out, "presets": list(scene.PRESETS), "notes": said}, text, 0
+    look, app = look_of(options), _viewer("app")
+    size = app.size_of(options.size or SHEET_SIZE)
+    one = _scene(options, app)
+    pixels = app.sheet(app.open_stage(one.luts, one.shape, one.given, size, one.other), look)
+    app.write(pixels, options.out)
+    said = {"sheet": options.out, "presets": list(scene.PRESETS), "notes": list(one.said)}
+    shown = f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets"
+    return said, "\n".join([shown, *one.said]), 0

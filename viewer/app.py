@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lutgen import color, head, maps, mesh, painting, scene
-from lutgen.errors import InputError
+from lutgen.errors import InputError, cannot_write
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -82,9 +82,11 @@ def _shrunk(values: np.ndarray, most: int = 4096) -> np.ndarray:
     return np.ascontiguousarray(values[::step, ::step])
 
 
-def open_stage(luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int]) -> passes.Stage:
-    """The stage of a head, its maps and a LUT set."""
-    return passes.open_stage(shape, textures_of(given), luts, size)
+def open_stage(
+    luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int], other: LutSet | None = None
+) -> passes.Stage:
+    """The stage of a head, its maps, a LUT set and maybe another to compare it with."""
+    return passes.open_stage(shape, textures_of(given), luts, size, other)
 
 
 def picture(stage: passes.Stage, look: Look) -> np.ndarray:
@@ -107,3 +109,15 @@ def sheet(stage: passes.Stage, look: Look, columns: int = 3, progress: Callable 
         ImageDraw.Draw(frame).text((10, height - 20), name, fill=(220, 220, 220))
         whole.paste(frame, (i % columns * width, i // columns * height))
     return np.asarray(whole)
+
+
+def write(pixels: np.ndarray, path: Path | str) -> None:
+    """Write a picture in the format that its name says."""
+    from PIL import Image
+
+    try:
+        Image.fromarray(np.ascontiguousarray(pixels)).save(path)
+    except ValueError as error:
+        raise InputError(f"{path}: the name of a picture is needed, for example out.png ({error})") from error
+    except OSError as error:
+        raise cannot_write("picture", path, error) from error

@@ -1,24 +1,24 @@
-"""The sliders beside the face, by Dear ImGui, and a small renderer for what it draws."""
+"""The panel beside the face: sliders, presets, split view, what is under the cursor, what a frame costs."""
 
 from __future__ import annotations
 
-import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
-import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from lutgen import scene
+from lutgen import color, scene
 from lutgen.errors import InputError, MachineError
 from lutgen.scene import Look
 from lutgen.tissue import PRESETS
 
-from . import gl
 from .passes import TAPS, Stage
+from .picking import Picked
 
-WIDTH = 300
+WIDTH, _PICK_WIDTH = 300, 260
 SLIDERS = (
     ("melanin", "%.4f"), ("eumelanin", "%.2f"), ("hemoglobin", "%.4f"), ("oxygenation", "%.2f"), (None, ""),
     ("light", "%.2f"), ("light_azimuth", "%.0f"), ("light_elevation", "%.0f"), ("light_size", "%.1f"),
@@ -27,48 +27,93 @@ SLIDERS = (
 )  # fmt: skip
 """Values of a look that have a slider, and how each is shown."""
 SHORTCUTS = (
-    "left drag: turn", "right drag or shift: move", "wheel: nearer, farther", "1 to 5: scattering tier",
-    "S: split view", "P: next preset", "R: start again", "?: this list", "Esc: close",
+    "left drag: turn the head", "ctrl + left drag: turn the light", "right or shift drag: move",
+    "wheel: nearer, farther",
+    "1 to 5: scattering tier", "S: split view", "P: next preset", "K: pick under the cursor", "R: start again",
+    "ctrl + click on a slider: type", "?: this list", "Esc: close",
 )  # fmt: skip
+SIDES = {
+    "scattering": ("scattering", "none"), "burley": ("each tone's profile", "one light-skin Burley"),
+    "set": ("LUT set A", "LUT set B"),
+}  # fmt: skip
+"""What the halves of each split view show."""
+_CHANNELS = ((235, 96, 84), (96, 205, 110), (96, 150, 245))
 
 
 @dataclass
 class Panel:
-    """ImGui's renderer on the GPU, and what the panel itself remembers."""
+    """What the panel itself remembers, and where each slider lies in the window (left, top, right, bottom)."""
 
-    program: moderngl.Program
-    textures: dict[int, moderngl.Texture] = field(default_factory=dict)
     path: str = "look.toml"
     said: str = ""
     shortcuts: bool = False
-    milliseconds: float = 0.0
+    picking: bool = False
+    places: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
 
 
-def open_panel() -> Panel:
-    """ImGui's context and the program that draws it."""
-    imgui.create_context()
-    io = imgui.get_io()
-    io.backend_flags |= imgui.BackendFlags_.renderer_has_textures | imgui.BackendFlags_.renderer_has_vtx_offset
-    io.set_ini_filename("")
-    program = gl.context().program(gl.splice("panel.vert.glsl"), gl.splice("panel.frag.glsl"))
-    return Panel(program)
+def splits(stage: Stage) -> tuple[str, ...]:
+    """The split views that a stage can show."""
+    return tuple(name for name in scene.SPLITS if name != "set" or "set" in stage.sides)
 
 
-def close(panel: Panel) -> None:
-    """Free what the panel holds."""
-    gl.free(panel.program, *panel.textures.values())
-    panel.textures.clear()
-    imgui.destroy_context()
-
-
-def build(panel: Panel, look: Look, stage: Stage, notes: tuple[str, ...], height: float) -> Look:
+def build(
+    panel: Panel, look: Look, stage: Stage, notes: tuple[str, ...], height: float, picked: Picked | None,
+    save_picture: Callable[[Path], None],
+) -> Look:  # fmt: skip
     """Lay out the panel of one frame; the look as the user has changed it."""
     imgui.set_next_window_pos((0, 0))
     imgui.set_next_window_size((WIDTH, height))
     flags = imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_collapse
     imgui.begin("lutgen", None, flags)
-    look = _presets(look)
-    imgui.push_item_width(150)
+    try:
+        look = _sliders(panel, _presets(look))
+        imgui.separator()
+        for name, allowed in (("tier", scene.TIERS), ("split", splits(stage))):
+            moved, k = imgui.combo(name, allowed.index(getattr(look, name)), list(allowed))
+            if moved:
+                look = replace(look, **{name: allowed[k]})
+        look = _file(panel, look, save_picture)
+    except (InputError, MachineError) as error:
+        panel.said = str(error)
+    if panel.said:
+        imgui.text_wrapped(panel.said)
+    imgui.separator()
+    _cost(look, stage)
+    _, panel.picking = imgui.checkbox("pick under the cursor (K)", panel.picking)
+    imgui.separator()
+    for note in (*notes, *(SHORTCUTS if panel.shortcuts else ("? lists the shortcuts",))):
+        imgui.text_wrapped(note)
+    imgui.end()
+    right, height = imgui.get_io().display_size
+    if panel.picking:
+        _picked(picked, right)
+    if look.split != "none":
+        _labels(look, right, height)
+    return look
+
+
+def _labels(look: Look, right: float, height: float) -> None:
+    """A line between the halves of a split view, and what each shows."""
+    draw, middle, white = imgui.get_background_draw_list(), (WIDTH + right) / 2, imgui.IM_COL32(230, 230, 230, 255)
+    draw.add_line((middle, 0), (middle, height), imgui.IM_COL32(230, 230, 230, 90))
+    mine, other = SIDES[look.split]
+    draw.add_text((middle - imgui.calc_text_size(mine).x - 8, height - 20), white, mine)
+    draw.add_text((middle + 8, height - 20), white, other)
+
+
+def _presets(look: Look) -> Look:
+    edge = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    spacing, padding = imgui.get_style().item_spacing.x, imgui.get_style().frame_padding.x
+    for i, name in enumerate(PRESETS):
+        if i and imgui.get_item_rect_max().x + spacing + imgui.calc_text_size(name).x + 2 * padding < edge:
+            imgui.same_line()
+        if imgui.small_button(name):
+            look = scene.of_preset(name, look)
+    return look
+
+
+def _sliders(panel: Panel, look: Look) -> Look:
+    imgui.push_item_width(0.5 * WIDTH)
     for name, shown in SLIDERS:
         if name is None:
             imgui.separator()
@@ -76,102 +121,84 @@ def build(panel: Panel, look: Look, stage: Stage, notes: tuple[str, ...], height
         low, high = scene.RANGES[name]
         kind = imgui.SliderFlags_.logarithmic if name in ("melanin", "hemoglobin") else imgui.SliderFlags_.none
         moved, value = imgui.slider_float(name.replace("_", " "), getattr(look, name), low, high, shown, kind)
+        panel.places[name] = *imgui.get_item_rect_min(), *imgui.get_item_rect_max()
         if moved:
-            look = replace(look, **{name: min(max(value, low), high)})
-    imgui.separator()
-    for name, allowed in (("tier", scene.TIERS), ("split", ("none", "scattering", "burley"))):
-        moved, k = imgui.combo(name, allowed.index(getattr(look, name)), list(allowed))
-        if moved:
-            look = replace(look, **{name: allowed[k]})
-    look = _file(panel, look)
+            look = replace(look, **{name: float(np.clip(value, low, high))})
     imgui.pop_item_width()
-    imgui.separator()
-    imgui.text(f"{panel.milliseconds:.1f} ms a frame, {TAPS[look.tier]} taps at most")
-    imgui.text(f"LUT textures {stage.uploaded.bytes / 1e6:.2f} MB")
-    for note in notes:
-        imgui.text_wrapped(note)
-    if panel.shortcuts:
-        imgui.separator()
-        for line in SHORTCUTS:
-            imgui.text(line)
-    else:
-        imgui.text("? lists the shortcuts")
-    imgui.end()
     return look
 
 
-def _presets(look: Look) -> Look:
-    for i, name in enumerate(PRESETS):
-        if i % 3:
-            imgui.same_line()
-        if imgui.small_button(name):
-            look = scene.of_preset(name, look)
-    return look
-
-
-def _file(panel: Panel, look: Look) -> Look:
-    _, panel.path = imgui.input_text("file", panel.path)
-    save = imgui.small_button("save look")
+def _file(panel: Panel, look: Look, save_picture: Callable[[Path], None]) -> Look:
+    _, panel.path = imgui.input_text("look", panel.path)
+    save = imgui.small_button("save")
     imgui.same_line()
-    load = imgui.small_button("load look")
-    try:
-        if save:
-            scene.save(look, Path(panel.path))
-            panel.said = f"saved {panel.path}"
-        if load:
-            look, panel.said = scene.load(Path(panel.path)), f"loaded {panel.path}"
-    except (InputError, MachineError) as error:
-        panel.said = str(error)
-    if panel.said:
-        imgui.text_wrapped(panel.said)
+    load = imgui.small_button("load")
+    imgui.same_line()
+    picture = imgui.small_button("save picture")
+    path = Path(panel.path)
+    if save:
+        scene.save(look, path)
+        panel.said = f"saved {path}"
+    if load:
+        look, panel.said = scene.load(path), f"loaded {path}"
+    if picture:
+        save_picture(path.with_suffix(".png"))
+        panel.said = f"saved {path.with_suffix('.png')}"
     return look
 
 
-def render(panel: Panel, target: moderngl.Framebuffer, scale: float) -> None:
-    """Draw what ImGui has laid out into a target; `scale` is target pixels per window unit."""
-    imgui.render()
-    data = imgui.get_draw_data()
-    for texture in imgui.get_platform_io().textures:
-        _texture(panel, texture)
-    context = gl.context()
-    target.use()
-    context.enable_only(moderngl.BLEND)
-    context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-    gl.put(panel.program, size=(target.width / scale, target.height / scale), glyphs=0)
-    for drawn in data.cmd_lists:
-        vertices = _buffer(drawn.vtx_buffer, 20)
-        indices = _buffer(drawn.idx_buffer, 2)
-        array = context.vertex_array(
-            panel.program, [(vertices, "2f 2f 4f1", "position", "uv", "color")], indices, index_element_size=2
+def _cost(look: Look, stage: Stage) -> None:
+    """Milliseconds of each pass, taps, and the LUT set's bytes."""
+    spent = stage.milliseconds
+    if spent:
+        imgui.text_wrapped(", ".join(f"{name} {value:.1f}" for name, value in spent.items()) + " ms")
+        imgui.text(f"{sum(spent.values()):.1f} ms on the GPU")
+    imgui.text(f"at most {TAPS[look.tier]} taps a pixel; LUTs {stage.sides['none'].textures.bytes / 1e6:.2f} MB")
+
+
+def _picked(picked: Picked | None, right: float) -> None:
+    """A window at the top right: the picked skin in numbers, its spectrum and its profile."""
+    imgui.set_next_window_pos((right - _PICK_WIDTH - 10, 10))
+    imgui.set_next_window_size((_PICK_WIDTH, 0))
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_inputs
+    imgui.begin("picked", None, flags)
+    if picked is None:
+        imgui.text("no skin under the cursor")
+    else:
+        _skin(picked)
+        top = np.ceil(picked.reflectance.max() * 5) / 5
+        nm = picked.wavelength_nm
+        _plot(
+            f"reflectance to {top:.1f}, 400 to 700 nm", (nm - 400) / 300, [(picked.reflectance / top, (230, 230, 230))]
         )
-        for command in drawn.cmd_buffer:
-            left, top, right, bottom = (v * scale for v in command.clip_rect)
-            target.scissor = int(left), int(target.height - bottom), int(right - left), int(bottom - top)
-            panel.textures[command.get_tex_id()].use(0)
-            array.render(moderngl.TRIANGLES, command.elem_count, first=command.idx_offset)
-        for thing in (array, vertices, indices):
-            thing.release()
-    target.scissor = None
+        edges, within = picked.profile.radius_edges_mm[1:], picked.profile.encircled()[1:]
+        along = np.log10(edges / 0.01) / 3
+        keep = (along >= 0) & (along <= 1)
+        curves = [(within[keep, c], tint) for c, tint in enumerate(_CHANNELS)]
+        _plot("light within r, 0.01 to 10 mm (log)", along[keep], curves)
+    imgui.end()
 
 
-def _buffer(held, size: int) -> moderngl.Buffer:
-    raw = ctypes.string_at(held.data_address(), held.size() * size)
-    return gl.context().buffer(raw or b"\0")
+def _skin(picked: Picked) -> None:
+    imgui.text(f"melanin {picked.melanin:.4f}  eumelanin {picked.eumelanin:.2f}")
+    thick = f"{picked.thickness_mm:.1f} mm thick" if picked.thickness_mm < 31.5 else "thick"
+    imgui.text(f"hemoglobin {picked.hemoglobin:.4f}  {thick}")
+    shown = color.encode_srgb(picked.linear_srgb)
+    imgui.color_button("diffuse color", (*shown, 1.0))
+    imgui.same_line()
+    imgui.text("sRGB " + " ".join(f"{255 * v:.0f}" for v in shown))
 
 
-def _texture(panel: Panel, wanted) -> None:
-    """Make, change or free one of ImGui's textures, as it asks."""
-    status = imgui.ImTextureStatus
-    if wanted.status in (status.want_create, status.want_updates):
-        old = panel.textures.pop(wanted.get_tex_id(), None)
-        if old is not None:
-            old.release()
-        pixels = np.asarray(wanted.get_pixels_array(), "u1").tobytes()
-        made = gl.context().texture((wanted.width, wanted.height), 4, pixels)
-        panel.textures[made.glo] = made
-        wanted.set_tex_id(made.glo)
-        wanted.set_status(status.ok)
-    elif wanted.status == status.want_destroy:
-        panel.textures.pop(wanted.get_tex_id()).release()
-        wanted.set_tex_id(0)
-        wanted.set_status(status.destroyed)
+def _plot(title: str, x: np.ndarray, curves: list[tuple[np.ndarray, tuple[int, int, int]]]) -> None:
+    """Curves over x, both in 0 to 1, in a box of the window's width."""
+    imgui.text(title)
+    left, top = imgui.get_cursor_screen_pos()
+    width, height = _PICK_WIDTH - 16.0, 90.0
+    draw = imgui.get_window_draw_list()
+    draw.add_rect((left, top), (left + width, top + height), imgui.IM_COL32(110, 110, 110, 255))
+    for y, tint in curves:
+        points = [imgui.ImVec2(left + width * float(u), top + height * (1 - float(np.clip(v, 0, 1))))
+                  for u, v in zip(x, y, strict=True)]  # fmt: skip
+        for a, b in pairwise(points):
+            draw.add_line(a, b, imgui.IM_COL32(*tint, 255), 1.5)
+    imgui.dummy((width, height + 4))

@@ -56,6 +56,7 @@ class Stage:
     ggx: moderngl.Texture
     targets: dict = field(default_factory=dict)
     oxygenation: float | None = None
+    milliseconds: dict[str, float] = field(default_factory=dict)
 
 
 def open_stage(
