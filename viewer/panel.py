@@ -104,11 +104,13 @@ def _labels(look: Look, right: float, height: float) -> None:
 def _presets(look: Look) -> Look:
     edge = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
     spacing, padding = imgui.get_style().item_spacing.x, imgui.get_style().frame_padding.x
+    imgui.push_id("presets")  # "light" is a slider too
     for i, name in enumerate(PRESETS):
         if i and imgui.get_item_rect_max().x + spacing + imgui.calc_text_size(name).x + 2 * padding < edge:
             imgui.same_line()
         if imgui.small_button(name):
             look = scene.of_preset(name, look)
+    imgui.pop_id()
     return look
 
 

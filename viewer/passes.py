@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from lutgen import color, scene
-from lutgen.errors import InputError
+from lutgen.errors import InputError, in_range
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
 
@@ -160,6 +160,14 @@ def set_oxygenation(stage: Stage, oxygenation: float) -> None:
     stage.oxygenation = oxygenation
 
 
+def require(stage: Stage, look: Look) -> None:
+    """Raise InputError where the stage cannot show a look: chromophores outside the LUTs' axes, no LUT set to split."""
+    for name in {"none", look.split} & {"none", "set"}:
+        grid = side(stage, name).luts.color_lut.grid
+        for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin):
+            in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
+
+
 def frames(look: Look) -> int:
     """How many frames are added up for a look: 16 at tier `reference`, each with other taps; else one."""
     return REFERENCE_FRAMES if look.tier == "reference" else 1
@@ -170,6 +178,7 @@ def draw(stage: Stage, look: Look, frame: int | None = None) -> None:
 
     All its frames, or one more of them: `frame` 0 starts anew, a later one adds to what is there.
     """
+    require(stage, look)
     camera = scene.camera(look, *stage.size)
     if not frame:
         set_oxygenation(stage, look.oxygenation)

@@ -11,7 +11,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from lutgen import scene
-from lutgen.errors import MachineError
+from lutgen.errors import InputError, MachineError
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -127,6 +127,12 @@ def _frame(window, state: State, drawer: overlay.Overlay, copy: gl.Pass, seconds
         passes.resize(state.stage, size)
         state.drawn = None
     if state.drawn != state.look:
+        try:
+            passes.require(state.stage, state.look)
+        except InputError as error:
+            if state.drawn is None and state.look == state.start:
+                raise
+            state.panel.said, state.look = str(error), state.drawn or state.start
         state.drawn, state.frames = state.look, 0
     if state.frames < passes.frames(state.look):
         passes.draw(state.stage, state.look, state.frames)
