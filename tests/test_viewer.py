@@ -3,7 +3,9 @@
 import gc
 import importlib
 import json
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -186,6 +188,20 @@ def test_bad_input_is_one_line(arguments, status, message, tmp_path, capsys, mon
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_a_set_of_another_version_is_one_line(tmp_path, capsys):
+    folder = tmp_path / "old"
+    shutil.copytree(Path(lutgen.__file__).parent.parent / "luts" / "default", folder)
+    facts = json.loads((folder / "manifest.json").read_text())
+    (folder / "manifest.json").write_text(json.dumps(facts | {"format": 99}))
+    for arguments in ([str(folder)], ["--compare", str(folder)]):
+        assert main(["view", "--screenshot", str(tmp_path / "out.png"), *arguments]) == 2
+        error = capsys.readouterr().err
+        assert "format = 99" in error
+        assert "bake it anew" in error
+        assert error.count("\n") == 1
     assert not (tmp_path / "out.png").exists()
 
 

@@ -56,6 +56,7 @@ class Screen:
         self.until(lambda frame: len(self.frames) > 3)
 
     def _listen(self) -> None:
+        assert self.viewer.stdout is not None
         for line in self.viewer.stdout:
             told = json.loads(line)
             if "places" in told:
@@ -123,7 +124,8 @@ class Screen:
             process.kill()
             process.wait()
         self.listener.join()
-        self.viewer.stdout.close()
+        if self.viewer.stdout is not None:
+            self.viewer.stdout.close()
 
 
 LOOK = {"distance_mm": 420, "azimuth": 0, "elevation": 0, "target_mm": "0,-30,0"}
