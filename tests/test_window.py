@@ -1,5 +1,6 @@
 """The real window on a virtual screen: what a user's mouse and keys do to the face, seen in the screen's own pixels."""
 
+import ctypes
 import importlib
 import json
 import os
@@ -24,28 +25,44 @@ WIDTH, HEIGHT = 320, 360
 WATCHED = """
 import importlib, json, sys
 from dataclasses import asdict
+import glfw
 from lutgen.cli import main
+wait = glfw.wait_events_timeout
+glfw.wait_events_timeout = lambda seconds: wait(0.05)  # frames that nothing asked for come sooner
 panel = importlib.import_module("lutgen.viewer.panel")
 build = panel.build
 def watched(one, look, stage, *others):
     look = build(one, look, stage, *others)
-    print(json.dumps({"places": one.places, "look": asdict(look), "size": stage.size}), flush=True)
+    typing = panel.imgui.get_io().want_text_input
+    print(json.dumps({"places": one.places, "look": asdict(look), "size": stage.size, "typing": typing}), flush=True)
     return look
 panel.build = watched
 sys.exit(main(sys.argv[1:]))
 """
 
 
+def _resources(display: str, text: bytes) -> None:
+    """Set a screen's resources, as a desktop does that knows its monitor's dots."""
+    x = ctypes.CDLL("libX11.so.6")
+    x.XOpenDisplay.restype, x.XDefaultRootWindow.restype = ctypes.c_void_p, ctypes.c_ulong
+    opened = ctypes.c_void_p(x.XOpenDisplay(display.encode()))
+    root, manager, string = ctypes.c_ulong(x.XDefaultRootWindow(opened)), ctypes.c_ulong(23), ctypes.c_ulong(31)
+    x.XChangeProperty(opened, root, manager, string, 8, 0, text, len(text))
+    x.XCloseDisplay(opened)
+
+
 class Screen:
     """A virtual screen whose pixels lie in a file, and a viewer in it that tells each frame's look."""
 
-    def __init__(self, folder: Path, arguments: list[str]):
+    def __init__(self, folder: Path, arguments: list[str], dots_per_inch: int = 96):
         reading, writing = os.pipe()
-        command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "900x500x24", "-fbdir", str(folder), "-nolisten"]
-        self.server = subprocess.Popen([*command, "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL)
+        command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "900x500x24", "-fbdir", str(folder), "-noreset"]
+        self.server = subprocess.Popen([*command, "-nolisten", "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL)
         os.close(writing)
         with os.fdopen(reading) as display:
             self.environment = os.environ | {"DISPLAY": f":{display.readline().strip()}"}
+        if dots_per_inch != 96:
+            _resources(self.environment["DISPLAY"], f"Xft.dpi:\t{dots_per_inch}\n".encode())
         self.pixels = folder / "Xvfb_screen0"
         self.viewer = subprocess.Popen(
             [sys.executable, "-c", WATCHED, *arguments], env=self.environment, stdout=subprocess.PIPE, text=True
@@ -91,27 +108,25 @@ class Screen:
         right = min(right, left + panel.WIDTH / 2)  # its name stands beside it
         start, end = (left + 0.5 * (right - left), left + share * (right - left))
         self.drag((start, (top + bottom) / 2), (end, (top + bottom) / 2))
-        seen = len(self.frames)
-        self.until(lambda _: len(self.frames) > seen + 8 and self.frames[-1]["look"] == self.frames[-6]["look"])
+        self.rest()
         return self.frames[-1]["look"][name]
 
-    def picture(self) -> np.ndarray:
-        """The face as the screen shows it [HEIGHT, WIDTH, 3], once it no longer changes."""
-        last, end = self._read(), time.monotonic() + 30
-        while time.monotonic() < end:
-            time.sleep(0.7)
-            now = self._read()
-            if np.array_equal(now, last):
-                return now
-            last = now
-        raise AssertionError("the picture never came to rest")
+    def rest(self) -> None:
+        """Wait until some frames in a row show the same; the first of them is on the screen by then."""
+        seen = len(self.frames)
+        self.until(lambda _: len(self.frames) > seen + 8 and all(f == self.frames[-1] for f in self.frames[-6:]))
+
+    def picture(self, left: int = panel.WIDTH, width: int = WIDTH, height: int = HEIGHT) -> np.ndarray:
+        """The face as the screen shows it [height, width, 3], once it no longer changes."""
+        self.rest()
+        return self._read()[:height, left : left + width]
 
     def _read(self) -> np.ndarray:
         raw = self.pixels.read_bytes()
         header = np.frombuffer(raw[:100], ">u4")  # X window dump: sizes and the color map come before the pixels
         height, row, start = header[5], header[12], header[0] + 12 * header[19]
         screen = np.frombuffer(raw, "u1", height * row, start).reshape(height, row // 4, 4)
-        return screen[:HEIGHT, panel.WIDTH : panel.WIDTH + WIDTH, 2::-1].astype(int)
+        return screen[..., 2::-1].astype(int)
 
     def close(self) -> int:
         """Press escape; the viewer's exit status."""
@@ -206,12 +221,13 @@ def test_keys_and_a_typed_value(screen):
     assert found["look"]["melanin"] in {s.melanin for s in lutgen.tissue.PRESETS.values()}
     left, top, _, bottom = found["places"]["hemoglobin"]
     screen.do("mousemove", round(left + 20), round((top + bottom) / 2), "keydown", "ctrl", "click", 1, "keyup", "ctrl")
-    time.sleep(0.5)
+    screen.until(lambda f: f["typing"])
     screen.do("key", "ctrl+a", "type", "0.05")
     screen.do("key", "Return")
     screen.until(lambda f: f["look"]["hemoglobin"] == pytest.approx(0.05))
     assert screen.frames[-1]["look"]["tier"] == "reference"  # the digits went to the field, not to the shortcuts
-    screen.do("mousemove", panel.WIDTH + 160, 180, "sleep", 1)
+    screen.do("mousemove", panel.WIDTH + 160, 180)
+    screen.until(lambda f: not f["typing"])
     screen.do("key", "r", "key", "k", "key", "question")
     screen.until(lambda f: f["look"]["split"] == "none")
 
@@ -227,6 +243,25 @@ def test_another_size_shows_the_whole_face(screen):
     screen.do("windowsize", number, panel.WIDTH + WIDTH, HEIGHT)
     screen.until(lambda f: f["size"] == [WIDTH, HEIGHT])
     assert np.array_equal(screen.picture(), before)
+
+
+def test_on_a_screen_of_many_dots_everything_is_as_large(tmp_path):
+    """192 dots per inch: the picture has twice the pixels each way, the panel keeps its size in units."""
+    made = Screen(tmp_path, ["view", "--size", "140x120", "--json", *SET], 192)
+    try:
+        assert made.frames[-1]["size"] == [280, 240]
+        out = tmp_path / "view.png"
+        assert main(["view", "--screenshot", str(out), "--size", "280x240", *SET]) == 0
+        made.do("mousemove", 1, 1)
+        shown = made.picture(2 * panel.WIDTH, 280, 240)
+        with Image.open(out) as image:
+            assert np.array_equal(shown, np.asarray(image).astype(int))
+        left, top, _, bottom = made.frames[-1]["places"]["melanin"]
+        made.do("mousemove", round(2 * (left + 100)), round(top + bottom), "click", 1)
+        made.until(lambda f: f["look"]["melanin"] > 0.03)
+        assert made.close() == 0
+    finally:
+        made.kill()
 
 
 def test_without_a_display_the_line_says_what_to_do():
