@@ -95,9 +95,19 @@ def _parser() -> argparse.ArgumentParser:
     sheet.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
     sheet.set_defaults(run="lutgen.commands.sheet")
 
+    export = commands.add_parser("export", help="a LUT set in the form that engines open")
+    export.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
+    export.add_argument(
+        "--to", required=True, metavar="TARGET[,TARGET...]", help="cube, exr, unreal, unity, ... or all"
+    )
+    export.add_argument("--out", required=True, metavar="DIR", help="folder to make, with one folder a target")
+    export.add_argument("--size", type=int, help="nodes along each axis of a cube (default: 31 for the default set)")
+    export.add_argument("--force", action="store_true", help="replace an existing folder")
+    export.set_defaults(run="lutgen.commands.export")
+
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability, view, sheet):
+    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability, view, sheet, export):
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

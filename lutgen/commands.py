@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable
@@ -11,8 +10,9 @@ from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
-from lutgen import color, config, manifest
+from lutgen import color, config, folders, manifest
 from lutgen.errors import InputError, MachineError, cannot_write
+from lutgen.progress import Progress
 
 Outcome = tuple[dict, str, int]
 
@@ -37,8 +37,8 @@ def bake(options: Namespace) -> Outcome:
     recipe = config.load(options.recipe, base) if options.recipe else base
     changes = {key: getattr(options, key) for key in ("photons", "wavelengths", "seed")}
     recipe = replace(recipe, **{key: value for key, value in changes.items() if value is not None})
-    out = manifest.check_target(options.out, options.force)
-    with _Progress(quiet=options.json) as progress:
+    out = folders.check_target(options.out, options.force)
+    with Progress(quiet=options.json) as progress:
         luts = baking.bake(recipe, device=options.device, progress=progress)
         progress("write", None)
         written = time.perf_counter()
@@ -61,42 +61,6 @@ def bake(options: Namespace) -> Outcome:
         + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
     )
     return result, text, 0
-
-
-class _Progress:
-    """A rich progress bar on a terminal, nothing elsewhere; called with the stage and, in the trace, a tally."""
-
-    def __init__(self, quiet: bool):
-        self._bar = None
-        if not quiet and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-            self._bar = Progress(
-                TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rate]}"),
-                TimeRemainingColumn(), console=Console(stderr=True), transient=True,
-            )  # fmt: skip
-            self._task = self._bar.add_task("start", total=None, rate="")
-            self._since = time.perf_counter()
-
-    def __enter__(self):
-        if self._bar:
-            self._bar.start()
-        return self
-
-    def __exit__(self, *_):
-        if self._bar:
-            self._bar.stop()
-
-    def __call__(self, stage: str, tally) -> None:
-        if not self._bar:
-            return
-        if tally is None:
-            self._since = time.perf_counter()
-            self._bar.update(self._task, description=stage, total=None, completed=0, rate="")
-        else:
-            rate = f"{tally.events / (time.perf_counter() - self._since) / 1e6:.0f} M events/s"
-            self._bar.update(self._task, total=tally.of, completed=tally.photons, rate=rate)
 
 
 def swatch(options: Namespace) -> Outcome:
@@ -242,7 +206,7 @@ def stability(options: Namespace) -> Outcome:
 
 def _drawn(options: Namespace, draw: Callable[..., dict[str, str]]) -> Outcome:
     out = Path(options.out)
-    with _Progress(quiet=options.json) as progress:
+    with Progress(quiet=options.json) as progress:
         shown = draw(out, progress=progress)
     text = f"{out.absolute()}\n" + "\n".join(f"{name}: {words}" for name, words in shown.items())
     return {"out": str(out.absolute()), "charts": shown}, text, 0
@@ -260,3 +224,17 @@ def sheet(options: Namespace) -> Outcome:
     from lutgen import showing
 
     return showing.sheet(options)
+
+
+def export(options: Namespace) -> Outcome:
+    """`lutgen export`: a folder per engine, and the error that each adds."""
+    import lutgen
+    from lutgen import exports
+
+    targets = exports.targets_of(options.to)
+    luts = lutgen.load(options.dir)
+    with Progress(quiet=options.json) as progress:
+        errors = exports.export(luts, targets, options.out, options.size, options.force, progress)
+    out = str(Path(options.out).absolute())
+    text = "\n".join([out, *(f"{name}: {said}" for name, (said, _) in errors.items())])
+    return {"out": out, "targets": list(targets), "error": {name: one for name, (_, one) in errors.items()}}, text, 0

@@ -14,7 +14,9 @@ import OpenEXR
 from lutgen.errors import InputError
 
 _PREFIX = "lutgen."
-_ACESCG = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+ACESCG = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
+"""Chromaticities: red, green, blue, white, x and y each."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ def rgb(image: np.ndarray) -> dict[str, np.ndarray]:
     return {name: np.ascontiguousarray(image[..., i]) for i, name in enumerate("RGB")}
 
 
-def write(path: Path, parts: list[Part]) -> None:
+def write(path: Path, parts: list[Part], chromaticities: tuple[float, ...] = ACESCG) -> None:
     """Write parts as ZIP scan lines; the same parts give the same bytes (no time stamp, no host)."""
     shapes = [next(iter(part.channels.values())).shape for part in parts]
     corner = np.array([max(s[1] for s in shapes) - 1, max(s[0] for s in shapes) - 1], "i4")
@@ -44,7 +46,7 @@ def write(path: Path, parts: list[Part]) -> None:
         header = {
             "type": OpenEXR.scanlineimage,
             "compression": OpenEXR.ZIP_COMPRESSION,
-            "chromaticities": _ACESCG,
+            "chromaticities": chromaticities,
             "displayWindow": (np.zeros(2, "i4"), corner),
             **{_PREFIX + key: json.dumps(value, sort_keys=True) for key, value in part.attributes.items()},
         }

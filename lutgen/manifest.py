@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import secrets
-import shutil
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr
+from lutgen import exr, folders
 from lutgen.axes import Axis, Grid
 from lutgen.color import ACESCG_FROM_XYZ
-from lutgen.errors import InputError, cannot_write, shown
+from lutgen.errors import InputError, shown
 from lutgen.lutset import ColorLut, LutSet, ProfileLut
 from lutgen.paths import PathTable
 
@@ -89,8 +86,7 @@ def _parts(luts: LutSet) -> dict[str, list[exr.Part]]:
 def save(luts: LutSet, out: str | Path, force: bool = False, notes: dict | None = None) -> Path:
     """Write a set to the folder `out`; it is there whole or not at all. `notes` (times, host) go into the manifest.
 
-    Files go to a sibling folder, are synced, and the folder is renamed. With `force` an old set is first moved
-    aside, then deleted. Raises InputError where `out` exists or cannot be written, MachineError on a full disk.
+    Raises InputError where `out` exists or cannot be written, MachineError on a full disk.
 
     >>> import lutgen, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -98,10 +94,7 @@ def save(luts: LutSet, out: str | Path, force: bool = False, notes: dict | None 
     ...     lutgen.load(out).oxygenation
     0.4
     """
-    target = check_target(out, force)
-    partial, old = (_sibling(target, kind) for kind in ("partial", "old"))
-    try:
-        partial.mkdir()
+    with folders.whole(out, force) as partial:
         for name, parts in _parts(luts).items():
             exr.write(partial / name, parts)
         from lutgen import preview  # Pillow stays off the path of those who only load
@@ -110,90 +103,7 @@ def save(luts: LutSet, out: str | Path, force: bool = False, notes: dict | None 
         hashes = {name: _sha256(partial / name) for name in FILES}
         manifest = luts.manifest | {"format": FORMAT, "files": hashes} | (notes or {})
         (partial / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
-        for path in (*partial.iterdir(), partial):
-            _sync(path)
-        if target.exists():
-            target.rename(old)
-        partial.rename(target)
-        _sync(target.parent)
-    except OSError as error:
-        raise cannot_write("out", out, error) from error
-    finally:
-        if old.exists() and not target.exists():
-            old.rename(target)
-        for leftover in (partial, old):
-            shutil.rmtree(leftover, ignore_errors=True)
     return Path(out)
-
-
-def check_target(out: str | Path, force: bool) -> Path:
-    """The real folder to write to; InputError, before any work, where a set cannot go there.
-
-    Clears what killed bakes left, and brings back a set whose replacement was killed between its two renames.
-    """
-    if not str(out):
-        raise InputError("out = '': the name of a folder is needed")
-    try:
-        target = Path(os.path.realpath(out))
-        if len(os.fsencode(target.name)) > 200:
-            raise InputError(f"out = {shown(str(out))}: the name is too long; allowed are 200 bytes")
-        if target.parent.is_dir():
-            _clear_leftovers(target)
-        if target.exists():
-            if not force:
-                raise InputError(f"out = {out}: exists; give another folder, or --force to replace it")
-            if not target.is_dir() or (any(target.iterdir()) and not (target / "manifest.json").exists()):
-                raise InputError(f"out = {out}: is not a LUT set, so --force does not replace it; give another folder")
-        if not target.parent.is_dir():
-            raise InputError(f"out = {out}: there is no folder {target.parent}; make it first")
-        if not os.access(target.parent, os.W_OK | os.X_OK):
-            raise InputError(f"out = {out}: folder {target.parent} cannot be written; choose another folder")
-    except OSError as error:
-        raise cannot_write("out", shown(str(out)), error) from error
-    return target
-
-
-def _clear_leftovers(target: Path) -> None:
-    for leftover in list(target.parent.iterdir()):
-        kind, _, rest = leftover.name.removeprefix(f".{target.name}.").partition("-")
-        process = rest.partition("-")[0]
-        if leftover.name.startswith(f".{target.name}.") and kind in ("partial", "old") and process.isdigit():
-            if _running(int(process)):
-                continue
-            if kind == "old" and not target.exists():
-                leftover.rename(target)
-            else:
-                shutil.rmtree(leftover, ignore_errors=True)
-
-
-def _running(process: int) -> bool:
-    """Whether another process of that number lives; one of this number is an earlier one's (containers reuse them)."""
-    if process == os.getpid():
-        return False
-    if os.name == "nt":
-        return True  # os.kill(process, 0) would interrupt it there; what it left stays
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
-
-
-def _sibling(target: Path, kind: str) -> Path:
-    return target.parent / f".{target.name}.{kind}-{os.getpid()}-{secrets.token_hex(4)}"
-
-
-def _sync(path: Path) -> None:
-    """Flush a file or folder to disk; Windows wants files open for writing and has no such call for folders."""
-    if os.name == "nt" and path.is_dir():
-        return
-    handle = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _sha256(path: Path) -> str:

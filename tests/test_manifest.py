@@ -15,7 +15,7 @@ import OpenEXR
 import pytest
 
 import lutgen
-from lutgen import exr, manifest
+from lutgen import exr, folders, manifest
 
 
 def test_round_trip_keeps_every_float(draft, draft_dir):
@@ -98,7 +98,7 @@ def test_odd_names_and_links(draft, tmp_path):
 def test_a_killed_replacement_gives_the_old_set_back(draft_dir, tmp_path):
     shutil.copytree(draft_dir, tmp_path / ".set.old-999999999-00000000")
     with pytest.raises(lutgen.InputError, match="exists"):
-        manifest.check_target(tmp_path / "set", force=False)
+        folders.check_target(tmp_path / "set", force=False)
     manifest.load(tmp_path / "set")
 
 
@@ -128,14 +128,14 @@ def test_a_failed_replacement_gives_the_old_set_back(draft, draft_dir, tmp_path,
 
 
 def test_every_file_is_synced_before_the_folder_takes_its_name(draft, tmp_path, monkeypatch):
-    synced, sync = [], manifest._sync
+    synced, sync = [], folders._sync
 
     def record(path):
         synced.append(path.name)
         assert (tmp_path / "set").exists() == (path == tmp_path)
         sync(path)
 
-    monkeypatch.setattr(manifest, "_sync", record)
+    monkeypatch.setattr(folders, "_sync", record)
     manifest.save(draft, tmp_path / "set")
     assert {*manifest.FILES, "manifest.json", tmp_path.name} <= set(synced)
 
@@ -144,7 +144,7 @@ def test_force_does_not_replace_what_is_no_set(draft, tmp_path):
     precious = tmp_path / "photos"
     precious.mkdir()
     (precious / "a.jpg").write_text("x")
-    with pytest.raises(lutgen.InputError, match="is not a LUT set"):
+    with pytest.raises(lutgen.InputError, match="not written by lutgen"):
         manifest.save(draft, precious, force=True)
     assert (precious / "a.jpg").exists()
 
@@ -298,7 +298,7 @@ def test_killed_at_any_moment_a_set_is_whole_or_absent(tmp_path):
             whole += 1
         else:
             absent += 1
-        manifest.check_target(out, force=True)
+        folders.check_target(out, force=True)
         assert {path.name for path in folder.iterdir()} <= {"set"}
     assert whole
     assert absent

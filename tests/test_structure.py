@@ -16,16 +16,16 @@ ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"cli"},
     {"commands", "benchmark", "checking", "showing"},
-    {"charts"},
+    {"charts", "exports"},
     {"baking"},
     {"solvers"},
     {"painting"},
     {"probing", "head", "maps"},
-    {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
+    {"folders", "manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
     {"axes", "tissue", "color", "sculpt"},
     {"chromophores"},
-    {"errors"},
+    {"progress", "errors"},
 ]
 HEAVY = {
     "pyopencl": {"device"}, "OpenEXR": {"exr"}, "colour": {"data"}, "scipy": {"data"}, "matplotlib": {"charts"},
