@@ -1,7 +1,8 @@
 """A MaterialX document with an OpenPBR surface per preset: subsurface color, radius and scale.
 
 OpenPBR's subsurface is a medium: `subsurface_radius` times `subsurface_radius_scale` is its mean free path, its albedo
-follows from `subsurface_color`. The mean free path whose searchlight profile is Burley's shape of length d is d (1.85 - A + 7 |A - 0.8|^3) for a surface of albedo A (Christensen & Burley 2015, equation 5).
+follows from `subsurface_color`. The mean free path whose searchlight profile is Burley's shape of length d is
+d (1.85 - A + 7 |A - 0.8|^3) for a surface of albedo A (Christensen & Burley 2015, equation 5).
 """
 
 from __future__ import annotations
@@ -65,15 +66,15 @@ def _numbers(values) -> str:
 
 def write(source: Source, folder: Path) -> Report:
     """Write skin.mtlx into a folder."""
-    presets = source.presets()
+    presets = source.presets
     (folder / FILE).write_text(document(presets), encoding="utf-8")
     error = {p.name: {"burley_ee_difference": p.burley_difference.tolist(), "negative_share": p.clamped_share.tolist()}
              for p in presets}  # fmt: skip
     worst = max(presets, key=lambda p: p.burley_difference.max())
     return Report((
-        f"{FILE}: a MaterialX 1.39 document, an OpenPBR surface and material for each of {len(presets)} presets.",
+        f"{FILE}: MaterialX 1.39, an OpenPBR surface and material for each of {len(presets)} presets.",
         "Space: linear Rec. 709. Lengths: 1 scene unit is 1 cm; scale subsurface_radius where yours is another.",
-        "subsurface_color: diffuse color without the entry transmission (0.9722), which the renderer's own coat applies.",
+        "subsurface_color: diffuse color without the entry transmission (0.9722), which the renderer applies itself.",
         "subsurface_radius * subsurface_radius_scale: mean free path per channel,",
         "d (1.85 - A + 7 |A - 0.8|^3) of the closest Burley shape d and the albedo A (Christensen & Burley 2015).",
         "No axis and no texture: values per preset; for maps use the cube or exr export.",

@@ -60,7 +60,7 @@ def write(source: Source, folder: Path) -> Report:
     """Write two strips per preset into a folder."""
     error = {}
     rng = np.random.default_rng(0)
-    for preset in source.presets():
+    for preset in source.presets:
         table, thin = texels(preset)
         tables = {f"shade_{preset.name}.exr": table, f"transmission_{preset.name}.exr": thin[None]}
         for name, values in tables.items():
@@ -77,10 +77,10 @@ def write(source: Source, folder: Path) -> Report:
     shade, thin_off = (max(one[k]["largest"] for one in error.values()) for k in ("shade", "transmission"))
     n, m, k = *SIZE, THICKNESSES
     return Report((
-        f"shade_PRESET.exr: {n} x {m} texels over N.L and curvature. transmission_PRESET.exr: {k} x 1, thickness.",
+        f"shade_PRESET.exr: {n} x {m}, N.L and curvature. transmission_PRESET.exr: {k} x 1, thickness.",
         "Half float, linear Rec. 709, ZIP. Sample bilinearly, clamped, without mips.",
-        f"u = ((N.L + 1) / 2 * {n - 1} + 0.5) / {n}; v = (c / {CURVATURE_PER_MM} * {m - 1} + 0.5) / {m}, row 0 is a plane;",
-        "curvature c in 1/mm: length(fwidth(normal)) / length(fwidth(position in mm)).",
+        f"u = ((N.L + 1) / 2 * {n - 1} + 0.5) / {n}; v = (c / {CURVATURE_PER_MM} * {m - 1} + 0.5) / {m};",
+        "row 0 is a plane; curvature c in 1/mm: length(fwidth(normal)) / length(fwidth(position in mm)).",
         f"Transmission: u = (pow(thickness / {THICKNESS_MM:g} mm, 1/3) * {k - 1} + 0.5) / {k}.",
         "shade * color of the preset * light is what leaves; 1 is a plane that the light hits head-on.",
         "transmission * color * light on the far side adds what comes through ears and nostrils.",

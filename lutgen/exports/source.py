@@ -92,6 +92,7 @@ class Source:
         axes = [getattr(self.grid, name) for name in AXES]
         return np.stack([warped(axis, skins[:, k]) for k, axis in enumerate(axes)], axis=1)
 
+    @cached_property
     def presets(self) -> list[Preset]:
         """The presets that the LUTs cover."""
         found = []
