@@ -126,6 +126,7 @@ def test_wheel_holds_one_name_and_its_data(tmp_path):
     for name in (
         "kernels/path_table.cl", "luts/bake.toml", "luts/default/manifest.json", "luts/default/paths.exr",
         "data/quadrature.csv", "data/color_tables.csv", "data/hemoglobin_prahl_1998.csv", "viewer/__init__.py",
+        "exports/templates/import_lutgen.py.txt", "exports/templates/LutgenImporter.cs",
     ):  # fmt: skip
         assert f"lutgen/{name}" in names
 

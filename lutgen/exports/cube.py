@@ -31,14 +31,20 @@ def text(source: Source, title: str) -> tuple[str, np.ndarray]:
     return "\n".join([*head, *rows]) + "\n", values
 
 
+def error(source: Source, values: np.ndarray) -> dict:
+    """What a reader of the values [N, N, N, 3] gets at random skins against the set's colors, and the share of these
+    that lies outside 0 to 1."""
+    exact = source.luts.color(*source.skins.T)
+    read = trilinear(values, source.coordinates(source.skins))
+    return {"color": difference(read, exact), "clipped_share": float(np.mean((exact < 0) | (exact > 1)))}
+
+
 def write(source: Source, folder: Path) -> Report:
     """Write skin.cube into a folder."""
     content, values = text(source, "lutgen skin")
     (folder / FILE).write_text(content, encoding="ascii")
-    exact = source.luts.color(*source.skins.T)
-    read = trilinear(values, source.coordinates(source.skins))
-    error = {"color": difference(read, exact), "clipped_share": float(np.mean((exact < 0) | (exact > 1)))}
-    n, largest, mean = source.size, error["color"]["largest"], error["color"]["mean"]
+    added = error(source, values)
+    n, largest, mean = source.size, added["color"]["largest"], added["color"]["mean"]
     return Report((
         f"{FILE}: 3-D LUT of skin color, {n} x {n} x {n} nodes, for OpenColorIO, Unity and tools.",
         "Input R, G, B: melanin, eumelanin, hemoglobin as coordinates t in 0 to 1 after the axis warp:",
@@ -49,4 +55,4 @@ def write(source: Source, folder: Path) -> Report:
         *MEANING,
         f"Error it adds: {largest:.2g} at most, {mean:.2g} on average at {len(source.skins)} skins, by resampling.",
         MADE,
-    ), error)  # fmt: skip
+    ), added)  # fmt: skip

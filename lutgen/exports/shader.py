@@ -54,13 +54,17 @@ def text(source: Source, dialect: str) -> str:
 
 
 def _hlsl(body: str) -> str:
-    """HLSL of the same: its types, its names, and textures as objects."""
+    """HLSL of the same: its types, its names, textures as objects, and counts as macros, which a function may hold too.
+
+    A texture's sampler is named as Unreal's Custom node names that of an input.
+    """
+    body = re.sub(r"const ivec3 (\w+) = ivec3\((.*)\);", r"#define \1 int3(\2)", body)
     body = re.sub(r"\bi?vec(\d)\b", lambda m: ("int" if m[0][0] == "i" else "float") + m[1], body)
-    body = body.replace("mix(", "lerp(").replace("const int3", "static const int3")
-    body = body.replace("sampler3D lut", "Texture3D lut, SamplerState state").replace(
+    body = body.replace("mix(", "lerp(")
+    body = body.replace("sampler3D lut", "Texture3D lut, SamplerState lutSampler").replace(
         "sampler2D profile", "Texture2D profile"
     )
-    body = re.sub(r"textureLod\(lut, (.*), 0\.0\)", r"lut.SampleLevel(state, \1, 0.0)", body)
+    body = re.sub(r"textureLod\(lut, (.*), 0\.0\)", r"lut.SampleLevel(lutSampler, \1, 0.0)", body)
     body = re.sub(r"texelFetch\(profile, int2\((.*?), row\), 0\)", r"profile.Load(int3(\1, row, 0))", body)
     return re.sub(r"float(\d)\((-?[\d.]+)\)", lambda m: f"float{m[1]}({', '.join([m[2]] * int(m[1]))})", body)
 
