@@ -426,6 +426,21 @@ def test_the_hlsl_compiles_and_reads_the_set(folder, source, tmp_path, text, tar
     assert rings == pytest.approx(exact[np.arange(len(skins)), columns], abs=2e-5, rel=1e-4)
 
 
+def test_a_fixed_axis_stays_one_texel_thick(asymmetric, tmp_path):
+    axis, profile = Axis("eumelanin", "1", 1.0, 1.0, 1), asymmetric.profile_lut
+    colors = ColorLut(replace(asymmetric.color_lut.grid, eumelanin=axis), asymmetric.color_lut.acescg[:, -1:])
+    grid = replace(profile.grid, eumelanin=axis)
+    shapes = replace(profile, grid=grid, shape=profile.shape[:, -1:], clamped_share=profile.clamped_share[:, -1:])
+    one = replace(asymmetric, color_lut=colors, profile_lut=shapes)
+    exports.export(one, ("unreal", "unity"), tmp_path / "out", None, False, lambda *_: None)
+    for target, volume in (("unreal", unreal_volume), ("unity", unity_volume)):
+        found = volume(tmp_path / "out" / target)
+        assert found.shape == (COUNTS[2], 1, COUNTS[0], 3)
+        assert found[3, 0, 2] == pytest.approx([0.35, 0.6, 0.2875], abs=1e-3)
+    for text in (unreal_nodes, unity_graph):
+        assert "texture" in compiled(text(tmp_path / "out"), tmp_path)
+
+
 def test_a_compiler_refuses_what_is_wrong(folder, tmp_path):
     with pytest.raises(AssertionError, match="error"):
         compiled(unreal_include(folder).replace("lerp(", "mix("), tmp_path)

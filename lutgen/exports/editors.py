@@ -75,11 +75,7 @@ def custom_node(functions: str, name: str) -> str:
     The code is pasted into a function, where none can be defined: axes become macros, the function its statements.
     """
     axis = r"float (\w+)\(float value\) \{\s*(?:value = (clamp\(.*\));\s*)?return (.*);\s*\}"
-
-    def macro(axis: re.Match) -> str:
-        return f"#define {axis[1]}(value) " + re.sub(r"\bvalue\b", axis[2] or "value", axis[3])
-
-    macros = re.sub(axis, macro, functions)
+    macros = re.sub(axis, _macro, functions)
     found = re.search(rf"^\w+ {name}\([^)]*\) \{{\n(.*?)^\}}", functions, re.DOTALL | re.MULTILINE)
     if not found:
         raise ValueError(f"{name}: not a function of the text")
@@ -87,6 +83,11 @@ def custom_node(functions: str, name: str) -> str:
     used = {word for word in re.findall(r"\w+", body) if word.startswith("lutgen_")}
     head = [line for line in macros.splitlines() if line.startswith("#define") and re.split(r"[ (]", line)[1] in used]
     return "\n".join([*head, body])
+
+
+def _macro(axis: re.Match) -> str:
+    """An axis function (its name, its clamped value, what it returns) as a macro."""
+    return f"#define {axis[1]}(value) " + re.sub(r"\bvalue\b", axis[2] or "value", axis[3])
 
 
 def hlsl(source: Source, note: str, more: str = "") -> str:
