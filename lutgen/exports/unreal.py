@@ -91,8 +91,8 @@ def write(source: Source, folder: Path) -> Report:
         " or lutgen.ush in PROJECT/Shaders, included as /Project/lutgen.ush. Skin: melanin, eumelanin, hemoglobin.",
         f"Axis warp: {'; '.join(warps(source.grid).values())}; half texel: u = (t * (n - 1) + 0.5) / n; both in the "
         "HLSL.",
-        "Subsurface Profile: color * distance * world unit scale = 0.6 (1.85 - A + 7 |A - 0.8|^3) d in cm, A the color, "
-        "d the closest Burley shape's; mean free path must stay enabled; IOR 1.4 (the engine's own is 1.55).",
+        "Subsurface Profile: color * distance * world unit scale = 0.6 (1.85 - A + 7 |A - 0.8|^3) d in cm, A the color,"
+        " d the closest Burley shape's; mean free path must stay enabled; IOR 1.4 (the engine's own is 1.55).",
         *MEANING,
         f"Error it adds: color {error['color']['largest']:.2g} (half floats); of the light at the wrong radius: rings "
         f"{error['rings']['largest']:.2g}, Subsurface Profiles {worst:.2g} at most (Burley's shape).",
