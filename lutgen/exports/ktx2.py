@@ -44,7 +44,9 @@ def _descriptor(size: int, primaries: int) -> bytes:
         struct.pack("<HBBIff", 8 * size * place, 8 * size - 1, channel | _SIGNED_FLOAT, 0, -1.0, 1.0)
         for place, channel in enumerate((0, 1, 2, _ALPHA))
     )
-    block = struct.pack("<IHH4B4B8B", 0, 2, 24 + len(samples), RGBSDA, primaries, LINEAR, 0, *(0,) * 4, 4 * size, *(0,) * 7)
+    block = struct.pack(
+        "<IHH4B4B8B", 0, 2, 24 + len(samples), RGBSDA, primaries, LINEAR, 0, *(0,) * 4, 4 * size, *(0,) * 7
+    )
     return struct.pack("<I", 4 + len(block) + len(samples)) + block + samples
 
 

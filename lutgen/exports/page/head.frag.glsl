@@ -42,7 +42,7 @@ float glint(vec3 n, vec3 v, vec3 l, float roughness) {
 }
 
 void main() {
-    if (height < -186.0) discard;  // the bust ends in a ragged edge
+    if (height < -178.0) discard;  // the bust ends in a ragged edge
     vec3 n = normalize(facing), v = normalize(-at);
     if (dot(n, v) < 0.0) n = normalize(n - dot(n, v) * v + 0.02 * v);
     vec3 m = mix(n, bumped(n), mapped), p = texture(pigments, uv).rgb;

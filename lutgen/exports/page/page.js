@@ -1,7 +1,8 @@
 "use strict";
 const data = "DATA";
 const NAMES = { melanin: "Melanin", eumelanin: "Eumelanin share", hemoglobin: "Blood" };
-const FRAMES = 48, SHADOW = 1024, PICTURE_PX = 1.6e6;
+const FRAMES = Number(location.hash.slice(1)) || 48;  // pictures averaged; page.html#8 is enough for a slow machine
+const SHADOW = 1024, PICTURE_PX = 1.6e6;
 const $ = (query) => document.querySelector(query);
 const canvas = $("canvas");
 const state = { skin: [0, 0, 0], turn: 0.36, tilt: 0.03, far: 965, frame: 0 };
