@@ -127,7 +127,7 @@ def test_wheel_holds_one_name_and_its_data(tmp_path):
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"lutgen"}
     for name in (
         "kernels/path_table.cl", "luts/bake.toml", "luts/default/manifest.json", "luts/default/paths.exr",
-        "exports/page/page.html", "exports/page/gather.frag.glsl",
+        "exports/templates/page.html", "exports/templates/gather.frag.glsl",
         "data/quadrature.csv", "data/color_tables.csv", "data/hemoglobin_prahl_1998.csv", "viewer/__init__.py",
     ):  # fmt: skip
         assert f"lutgen/{name}" in names

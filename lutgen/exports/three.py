@@ -23,6 +23,17 @@ from lutgen.exports.source import AXES, ENTRY, MADE, MEANING, Report, Source, di
 COLOR, PROFILE, CHUNK, PAGE = "skin_color.ktx2", "skin_profile.ktx2", "skin.glsl", "skin.html"
 _PRECISION = "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\nprecision highp sampler3D;\n"
 """OpenGL ES has no default for a 3-D sampler."""
+SHADERS = (
+    "head.vert",
+    "head.frag",
+    "shadow.vert",
+    "shadow.frag",
+    "screen.vert",
+    "row.frag",
+    "gather.frag",
+    "finish.frag",
+)
+"""Of the page."""
 _JPEG = {"format": "JPEG", "quality": 85, "subsampling": 0}
 
 
@@ -47,12 +58,13 @@ def write(source: Source, folder: Path) -> Report:
     error = {"color": difference(read, source.luts.color(*source.skins.T)), "profile": difference(profile, table)}
     N_h, N_e, N_m = source.grid.shape
     counts = source.luts.profile_lut.grid.shape[::-1]
+    axes = "; ".join(code.removeprefix("t = ") for code in warps(source.grid).values())
     return Report((
         f"{COLOR}: 3-D, {N_m} x {N_e} x {N_h}, RGBA half. {PROFILE}: 2-D. {CHUNK}: GLSL that reads both.",
         f"{PAGE}: all of it in one page, with sliders, in plain WebGL2; open it from the disk, it needs no network.",
-        "three.js: new KTX2Loader().detectSupport(renderer).loadAsync(...); minFilter, magFilter = LinearFilter, wraps",
-        f"clamped; profile NearestFilter. Color: linear Rec. 709, unclipped; {'; '.join(warps(source.grid).values())};",
-        f"u = (t * (N - 1) + 0.5) / N for N = {N_m}, {N_e}, {N_h} (x melanin, y eumelanin, z hemoglobin).",
+        "three.js: new KTX2Loader().detectSupport(renderer).loadAsync(...); LinearFilter, profile NearestFilter; clamped.",
+        "Color: linear Rec. 709, unclipped; x melanin, y eumelanin, z hemoglobin: u = (t (N - 1) + 0.5) / N,",
+        f"t = {axes}.",
         f"Profile: column k: quantile (k + 0.5) / {shader.QUANTILES}; row: node of {' x '.join(map(str, counts))}; "
         "radius mm, encircled energy.",
         *MEANING,
@@ -70,6 +82,7 @@ def _color(source: Source) -> np.ndarray:
 
 def page(source: Source, written: dict[str, bytes]) -> str:
     """The page as HTML, everything inside: shaders, textures as they were written, and the built-in head."""
+    template = files("lutgen.exports").joinpath("templates")
     shape = head.builtin()
     painted = painting.paint(shape)
     arrays, facts = _mesh(shape)
@@ -80,12 +93,9 @@ def page(source: Source, written: dict[str, bytes]) -> str:
         "mesh": facts, "axes": {name: _axis(getattr(source.grid, name)) for name in AXES},
         "presets": {preset.name: preset.skin for preset in source.presets},
         "swatches": {preset.name: _eight_bit(preset.linear_srgb) for preset in source.presets},
-        "shaders": {path.name.removesuffix(".glsl"): path.read_text(encoding="utf-8")
-                    for path in sorted(files("lutgen.exports").joinpath("page").iterdir(), key=lambda path: path.name)
-                    if path.name.endswith(".glsl")},
+        "shaders": {name: template.joinpath(f"{name}.glsl").read_text(encoding="utf-8") for name in SHADERS},
         "chunk": written[CHUNK].decode() + f"\nconst float ENTRY = {ENTRY:.9g};\n",
     }  # fmt: skip
-    template = files("lutgen.exports").joinpath("page")
     text = template.joinpath("page.html").read_text(encoding="utf-8")
     script = template.joinpath("page.js").read_text(encoding="utf-8")
     safe = json.dumps(data).replace("</", "<\\/")  # else a text in it could end the script element
