@@ -33,7 +33,9 @@ def imported(path: Path) -> tuple[str, str, bytes]:
     assert given["compress/mode"] == "3"
     assert given["mipmaps/generate"] == "false"
     source = OpenImageIO.ImageInput.open(str(path))
+    assert source is not None
     texels = source.read_image("half")
+    assert texels is not None
     source.close()
     if given["importer"] == "texture":
         assert given["type"] == "CompressedTexture2D"

@@ -46,7 +46,7 @@ void fragment() {
     COLOR = vec4(packed(VALUES), 1.0);
 }
 """
-RADIUS_MM = 8.0
+RADIUS_MM, SCALE = 8.0, "vec4(8.0, 1.0, 1.0, 1.0)"
 """What a packed radius of 1 stands for."""
 
 
@@ -82,11 +82,13 @@ def test_the_folder_imports_itself(folder, source):
 
 def test_a_fixed_axis_and_no_preset(source, tmp_path):
     """A set of one eumelanin that covers no preset: a thin volume, no slider, an empty scene."""
-    fixed = replace(source.grid, eumelanin=Axis("eumelanin", "1", 0.2, 0.2, 1))
-    one = sources.Source(replace(source.luts, color_lut=ColorLut(fixed, source.luts.color_lut.acescg[:, :1])), 5)
-    godot.write(one, tmp_path)
+    luts, axis = source.luts, Axis("eumelanin", "1", 1.0, 1.0, 1)
+    colors = ColorLut(replace(source.grid, eumelanin=axis), luts.color_lut.acescg[:, -1:])
+    shapes = replace(luts.profile_lut, grid=replace(luts.profile_lut.grid, eumelanin=axis),
+                     shape=luts.profile_lut.shape[:, -1:], clamped_share=luts.profile_lut.clamped_share[:, -1:])  # fmt: skip
+    godot.write(sources.Source(replace(luts, color_lut=colors, profile_lut=shapes), 5), tmp_path)
     text = (tmp_path / "skin.gdshader").read_text()
-    assert "uniform float eumelanin = 0.2;" in text
+    assert "uniform float eumelanin = 1.0;" in text
     assert "uniform float melanin : hint_range(0.001, 0.5, 0.0001) = 0.001;" in text
     assert not list(tmp_path.glob("*.tres"))
     assert godot_pack.imported(tmp_path / "skin_color.exr")[2][36 + 4 : 36 + 8] == struct.pack("<HH", 16, 1)
@@ -116,7 +118,7 @@ def ran(folder, source, quantiles, tmp_path_factory):
         "points": np.column_stack([skins, quantiles]).ravel().tolist(),
         "shaders": {
             "whole": whole, "color": plane.replace("VALUES", "vec4(lutgen_color(skin_color, point.xyz), 1.0)"),
-            "ring": plane.replace("VALUES", f"lutgen_ring(skin_profile, point.w, point.xyz) / vec4({RADIUS_MM}, vec3(1.0))"),
+            "ring": plane.replace("VALUES", f"lutgen_ring(skin_profile, point.w, point.xyz) / {SCALE}"),
         },
     }  # fmt: skip
     files = godot_pack.project(folder, "skin") | {
@@ -204,6 +206,6 @@ def test_the_exported_scene_shows_every_preset(ran, source):
         seen = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
         normal = np.array([-0.26 * (i % 3 - 1), -0.26 * (1 - i // 3), 1.5])  # toward the camera
         normal /= np.linalg.norm(normal)
-        light = 0.25 + 0.8 * max(normal @ key, 0) + 0.35 * max(normal @ rim, 0)
+        light = 0.25 + 1.0 * max(normal @ key, 0) + 0.35 * max(normal @ rim, 0)
         gloss = seen - light * preset.linear_srgb
         assert np.all((gloss > -0.005) & (gloss < 0.015)), preset.name

@@ -76,10 +76,9 @@ def sidecar(importer: str, kind: str, parameters: dict) -> str:
 def shader_text(source: Source) -> str:
     """The shader: its sliders span the set's axes and start at the first preset that the set covers."""
     sliders = []
-    start = dict(zip(AXES, source.presets[0].skin, strict=True)) if source.presets else {}
-    for name in AXES:
+    start = source.presets[0].skin if source.presets else [getattr(source.grid, name).low for name in AXES]
+    for name, value in zip(AXES, start, strict=True):
         axis = getattr(source.grid, name)
-        value = start.get(name, axis.low)
         span = f" : hint_range({axis.low:.9g}, {axis.high:.9g}, 0.0001)" if axis.count > 1 else ""
         sliders.append(f"uniform float {name}{span} = {float(value)};")
     text = files("lutgen.exports").joinpath("templates", SHADER).read_text(encoding="utf-8")
@@ -111,7 +110,7 @@ def scene(presets: list[Preset]) -> str:
         '[node name="Skin" type="Node3D"]\n',
         '[node name="Surroundings" type="WorldEnvironment" parent="."]\nenvironment = SubResource("gray")\n',
         _node("Camera", "Camera3D", _looking((0, 0, 1.5)), "fov = 32.0\nnear = 0.1\nfar = 10.0\ncurrent = true"),
-        _node("Key", "DirectionalLight3D", _looking((-0.6, 0.7, 0.8)), "light_energy = 0.8"),
+        _node("Key", "DirectionalLight3D", _looking((-0.6, 0.7, 0.8)), "light_energy = 1.0"),
         _node("Rim", "DirectionalLight3D", _looking((0.9, 0.2, -0.6)), "light_energy = 0.35"),
     ]
     rows = -(-len(presets) // 3)
