@@ -67,6 +67,7 @@ def test_the_folder_imports_itself(folder, source):
     names = {path.name for path in folder.iterdir()}
     assert names >= {"skin_color.exr", "skin_color.exr.import", "skin_profile.exr.import", "skin.gdshader", "skin.tscn"}
     assert "project.godot" not in names
+    assert (folder / "README.txt").read_text().splitlines()[8].startswith("Error it adds (half floats): color 0.00019")
     for path in folder.iterdir():
         if path.suffix in (".tscn", ".tres", ".import"):
             assert "res://" not in path.read_text()
@@ -84,8 +85,10 @@ def test_a_fixed_axis_and_no_preset(source, tmp_path):
     """A set of one eumelanin that covers no preset: a thin volume, no slider, an empty scene."""
     luts, axis = source.luts, Axis("eumelanin", "1", 1.0, 1.0, 1)
     colors = ColorLut(replace(source.grid, eumelanin=axis), luts.color_lut.acescg[:, -1:])
-    shapes = replace(luts.profile_lut, grid=replace(luts.profile_lut.grid, eumelanin=axis),
-                     shape=luts.profile_lut.shape[:, -1:], clamped_share=luts.profile_lut.clamped_share[:, -1:])  # fmt: skip
+    lut = luts.profile_lut
+    shapes = replace(
+        lut, grid=replace(lut.grid, eumelanin=axis), shape=lut.shape[:, -1:], clamped_share=lut.clamped_share[:, -1:]
+    )
     godot.write(sources.Source(replace(luts, color_lut=colors, profile_lut=shapes), 5), tmp_path)
     text = (tmp_path / "skin.gdshader").read_text()
     assert "uniform float eumelanin = 1.0;" in text

@@ -60,6 +60,12 @@ def test_ktx_parse_reads_both_textures(folder, source):
     assert np.array_equal(rows, shader.profile_texels(source).astype("f2"))
 
 
+def test_the_readme_states_the_error(folder):
+    lines = (folder / "three/README.txt").read_text().splitlines()
+    assert len(lines) == 10
+    assert lines[8].startswith("Error it adds (half floats): color 0.00019")
+
+
 def test_the_files_lie_as_the_specification_asks(folder):
     """Level data starts at a multiple of a texel, where the index says, and ends with the file."""
     for name, size in (("skin_color.ktx2", 8), ("skin_profile.ktx2", 8)):

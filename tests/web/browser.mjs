@@ -35,13 +35,10 @@ export async function withPage({ folders = {}, texts = {}, viewport = { width: 6
     const page = await browser.newPage({ viewport, deviceScaleFactor: scale });
     page.setDefaultTimeout(60000);
     page.on("pageerror", (error) => problems.push(error.message));
-    page.on("response", (answer) => {
-      if (answer.status() >= 400 && !answer.url().endsWith("/favicon.ico")) problems.push(`${answer.status()} ${answer.url()}`);
-    });
     page.on("console", (message) => {
       log.push(message.text());
-      const missing = message.text().startsWith("Failed to load resource");  // told by the answer, with its address
-      if (message.type() === "error" && !missing) problems.push(message.text());
+      const icon = message.location().url.endsWith("/favicon.ico");  // which every browser asks for
+      if (message.type() === "error" && !icon) problems.push(`${message.text()} ${message.location().url}`);
     });
     const found = await work(page, base, log);
     if (problems.length) throw new Error(problems.join("\n"));
