@@ -9,7 +9,7 @@ from pathlib import Path
 WEB = Path(__file__).parent / "web"
 
 
-def node(script: str, *arguments, timeout: float = 150):
+def node(script: str, *arguments, timeout: float = 240):
     """What a script of tests/web prints as JSON; it fails with the script's last words, or after `timeout` seconds."""
     _install()
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

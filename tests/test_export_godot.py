@@ -136,9 +136,7 @@ def ran(folder, source, quantiles, tmp_path_factory):
     }
     place = tmp_path_factory.mktemp("pack")
     (place / "main.pck").write_bytes(godot_pack.pck(files))
-    return node("godot.mjs", place, place / "scene.png", timeout=200), np.asarray(
-        Image.open(place / "scene.png").convert("RGB")
-    )
+    return node("godot.mjs", place, place / "scene.png"), np.asarray(Image.open(place / "scene.png").convert("RGB"))
 
 
 def _texels(values: np.ndarray) -> list[float]:

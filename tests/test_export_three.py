@@ -121,7 +121,7 @@ def test_the_glsl_reads_rings(read, source):
     rows, along = np.arange(len(found)), (column - first)[:, None]
     expected = (1 - along) * table[rows, first] + along * table[rows, first + 1]
     assert np.all(np.abs(found - expected) <= HALF * expected + 5e-6)
-    assert found[:, 1:].min(axis=1) == pytest.approx((column + 0.5) / 64, abs=0.03)
+    assert found[:, 1:].min(axis=1) == pytest.approx((column + 0.5) / 64, abs=1e-5)
 
 
 @pytest.fixture(scope="module")
