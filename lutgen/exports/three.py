@@ -97,7 +97,7 @@ def page(source: Source, written: dict[str, bytes]) -> str:
         "chunk": written[CHUNK].decode() + f"\nconst float ENTRY = {ENTRY:.9g};\n",
     }  # fmt: skip
     text = template.joinpath("page.html").read_text(encoding="utf-8")
-    script = template.joinpath("page.js").read_text(encoding="utf-8")
+    script = "\n".join(template.joinpath(name).read_text(encoding="utf-8") for name in ("gl.js", "page.js"))
     safe = json.dumps(data).replace("</", "<\\/")  # else a text in it could end the script element
     return text.replace("/*SCRIPT*/", script).replace('"DATA"', safe)
 
