@@ -117,7 +117,9 @@ def test_every_public_name_shows_an_example():
 
 def test_wheel_holds_one_name_and_its_data(tmp_path):
     clean = tmp_path / "source"  # a build leaves files in its source, which the next one would pack
-    shutil.copytree(ROOT, clean, ignore=shutil.ignore_patterns(".*", "build", "*.egg-info", "__pycache__"))
+    shutil.copytree(
+        ROOT, clean, ignore=shutil.ignore_patterns(".*", "build", "*.egg-info", "__pycache__", "node_modules")
+    )
     command = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(clean)]
     subprocess.run(command, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
@@ -125,6 +127,7 @@ def test_wheel_holds_one_name_and_its_data(tmp_path):
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"lutgen"}
     for name in (
         "kernels/path_table.cl", "luts/bake.toml", "luts/default/manifest.json", "luts/default/paths.exr",
+        "exports/templates/page.html", "exports/templates/gather.frag.glsl",
         "data/quadrature.csv", "data/color_tables.csv", "data/hemoglobin_prahl_1998.csv", "viewer/__init__.py",
         "exports/templates/import_lutgen.py.txt", "exports/templates/LutgenImporter.cs",
     ):  # fmt: skip

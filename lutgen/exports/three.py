@@ -1,0 +1,142 @@
+"""For three.js and plain WebGL2: the color LUT as a 3-D KTX2, the profiles as a 2-D one, GLSL, and a page that runs."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import zlib
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from lutgen import head, maps, painting
+from lutgen.axes import Axis
+from lutgen.color import encode_srgb
+from lutgen.exports import shader
+from lutgen.exports.ktx2 import UNSPECIFIED, ktx2
+from lutgen.exports.source import AXES, ENTRY, MADE, MEANING, Report, Source, difference, trilinear, warps
+
+COLOR, PROFILE, CHUNK, PAGE = "skin_color.ktx2", "skin_profile.ktx2", "skin.glsl", "skin.html"
+_PRECISION = "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\nprecision highp sampler3D;\n"
+"""OpenGL ES has no default for a 3-D sampler."""
+SHADERS = (
+    "head.vert",
+    "head.frag",
+    "shadow.vert",
+    "shadow.frag",
+    "screen.vert",
+    "row.frag",
+    "gather.frag",
+    "finish.frag",
+)
+"""Of the page."""
+_JPEG = {"format": "JPEG", "quality": 85, "subsampling": 0}
+
+
+def write(source: Source, folder: Path) -> Report:
+    """Write both textures, the GLSL and the page into a folder."""
+    color = _color(source)
+    table = shader.profile_texels(source)
+    profile = table.astype("f2")
+    notes = {"KTXwriter": f"lutgen {version('lutgen')}", "lutgen.axes": json.dumps(warps(source.grid))}
+    written = {
+        COLOR: ktx2(color, notes | {"lutgen.space": "linear Rec. 709; x melanin, y eumelanin, z hemoglobin"}),
+        PROFILE: ktx2(
+            profile, notes | {"lutgen.columns": "radius mm, encircled energy R, G, B; row = node"}, UNSPECIFIED
+        ),
+        CHUNK: (_PRECISION + shader.text(source, "glsl")).encode(),
+    }
+    for name, content in written.items():
+        (folder / name).write_bytes(content)
+    (folder / PAGE).write_text(page(source, written), encoding="utf-8")
+
+    read = trilinear(color[..., :3].astype(float), source.coordinates(source.skins))
+    error = {"color": difference(read, source.luts.color(*source.skins.T)), "profile": difference(profile, table)}
+    N_h, N_e, N_m = source.grid.shape
+    counts = source.luts.profile_lut.grid.shape[::-1]
+    axes = "; ".join(code.removeprefix("t = ") for code in warps(source.grid).values())
+    return Report((
+        f"{COLOR}: 3-D, {N_m} x {N_e} x {N_h}, RGBA half. {PROFILE}: 2-D. {CHUNK}: GLSL that reads both.",
+        f"{PAGE}: all of it in one page, with sliders, in plain WebGL2; open it from the disk, it needs no network.",
+        "three.js: new KTX2Loader().detectSupport(renderer).loadAsync(...); LinearFilter, clamped.",
+        "Color: linear Rec. 709, unclipped; x melanin, y eumelanin, z hemoglobin: u = (t (N - 1) + 0.5) / N,",
+        f"t = {axes}.",
+        f"Profile: column k: quantile (k + 0.5) / {shader.QUANTILES}; row: node of {' x '.join(map(str, counts))}; "
+        "radius mm, encircled energy.",
+        *MEANING,
+        f"Error it adds (half floats): color {error['color']['largest']:.2g}, radius in mm or encircled energy "
+        f"{error['profile']['largest']:.2g} at most.",
+        MADE,
+    ), error)  # fmt: skip
+
+
+def _color(source: Source) -> np.ndarray:
+    """The texture [N_h, N_e, N_m, 4] in half floats; alpha is 1."""
+    own = source.own_colors("srgb")
+    return np.concatenate([own, np.ones((*own.shape[:3], 1))], axis=-1).astype("f2")
+
+
+def page(source: Source, written: dict[str, bytes]) -> str:
+    """The page as HTML, everything inside: shaders, textures as they were written, and the built-in head."""
+    template = files("lutgen.exports").joinpath("templates")
+    shape = head.builtin()
+    painted = painting.paint(shape)
+    arrays, facts = _mesh(shape)
+    packed = {COLOR: written[COLOR], PROFILE: written[PROFILE], **arrays}
+    data = {
+        "packed": {name: _text(zlib.compress(content, 9)) for name, content in packed.items()},
+        "pictures": {"pigments": _text(_pigments(painted)), "bumps": _text(_jpeg(painted["normal"]))},
+        "mesh": facts, "axes": {name: _axis(getattr(source.grid, name)) for name in AXES},
+        "presets": {preset.name: preset.skin for preset in source.presets},
+        "swatches": {preset.name: _eight_bit(preset.linear_srgb) for preset in source.presets},
+        "shaders": {name: template.joinpath(f"{name}.glsl").read_text(encoding="utf-8") for name in SHADERS},
+        "chunk": written[CHUNK].decode() + f"\nconst float ENTRY = {ENTRY:.9g};\n",
+    }  # fmt: skip
+    text = template.joinpath("page.html").read_text(encoding="utf-8")
+    script = "\n".join(template.joinpath(name).read_text(encoding="utf-8") for name in ("gl.js", "page.js"))
+    safe = json.dumps(data).replace("</", "<\\/")  # else a text in it could end the script element
+    return text.replace("/*SCRIPT*/", script).replace('"DATA"', safe)
+
+
+def _eight_bit(linear_srgb: np.ndarray) -> list[int]:
+    return np.round(255 * encode_srgb(np.clip(linear_srgb, 0, 1))).astype(int).tolist()
+
+
+def _axis(axis: Axis) -> dict:
+    return {"low": axis.low, "high": axis.high, "exponent": axis.exponent}
+
+
+def _mesh(shape) -> tuple[dict[str, bytes], dict]:
+    """The head's arrays, one number after the other and as differences, which pack to a third; how to undo that."""
+    kept = head.made()
+    p, n = np.asarray(shape.positions_mm, float), np.asarray(shape.normals, float)
+    low, span = p.min(axis=0), np.ptp(p, axis=0)
+    positions = np.round((p - low) / span * 65535).astype("u2")
+    corners = np.round(np.asarray(shape.uv, float) * 65535).astype("u2")
+    facing = np.round(n * 127).astype("i1")
+    sky = np.round(255 * np.clip(kept["open"], 0, 1)).astype("u1")
+    index = shape.triangles.astype("u2").ravel()  # the head has fewer than 65,536 vertices
+    order = {"positions": positions, "corners": corners, "facing": facing, "sky": sky[:, None], "index": index[:, None]}
+    arrays = {name: np.diff(values, axis=0, prepend=values.dtype.type(0)).T.tobytes() for name, values in order.items()}
+    return arrays, {"vertices": len(p), "corners": len(index), "low": low.tolist(), "span": span.tolist()}
+
+
+def _pigments(painted: dict) -> bytes:
+    """Ratios of melanin and hemoglobin as maps hold them, and half the ratio of roughness, in one picture."""
+    ratios, surface = painted["chromophores"], painted["surface"]
+    rough = np.round(np.clip(surface[..., 0] / maps.SURFACE_RANGE, 0, 1) * 255).astype("u1")
+    return _jpeg(np.stack([maps.encode_ratio(ratios[..., 0]), maps.encode_ratio(ratios[..., 2]), rough], axis=-1))
+
+
+def _jpeg(picture: np.ndarray) -> bytes:
+    out = io.BytesIO()
+    Image.fromarray(picture).save(out, **_JPEG)
+    return out.getvalue()
+
+
+def _text(content: bytes) -> str:
+    return base64.b64encode(content).decode()
