@@ -52,11 +52,11 @@ def _within(p: np.ndarray, low, high, far: float, distance: Callable) -> np.ndar
 
 
 FLUSHED = (
-    (0.75, (40, -30, 62), 15), (0.8, (0, -36, 106), 10), (0.6, (13, -40, 95), 7), (0.35, (0, -94, 88), 13),
-    (0.5, (31, -12, 74), 9), (0.25, (0, 45, 75), 22), (0.4, (18, -3, 76), 5),
+    (1.2, (42, -30, 60), 15), (1.3, (0, -37, 106), 10), (1.1, (13, -41, 94), 6), (0.6, (0, -92, 88), 13),
+    (0.8, (31, -12, 74), 8), (0.25, (0, 45, 75), 22), (0.7, (18, -4, 76), 5), (0.5, (26, -52, 82), 9),
 )  # fmt: skip
 """Where more blood runs (share more, place and radius in mm): cheeks, tip and wings of the nose, chin, lids, brow."""
-MOLES = ((1.1, (34, -57, 78)), (0.8, (-22, -28, 88)), (0.7, (-46, 2, 58)), (0.6, (12, 42, 84)), (0.9, (-47, -62, 42)))
+MOLES = ((0.8, (34, -57, 78)), (0.8, (-22, -28, 88)), (0.7, (-46, 2, 58)), (0.6, (12, 42, 84)), (0.9, (-47, -62, 42)))
 """Radius and place in mm."""
 
 
@@ -65,13 +65,13 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     x, y, z = np.abs(p[..., 0]), p[..., 1], p[..., 2]
     wobble = _mottled(p / 3.5, 3, 9)
     red = _within(p, (0, -80, 60), (34, -52, 110), 9.0, lambda q: np.minimum(*sculpt.lips(q)))
-    lip = _smooth(1.3, -0.5, red + 1.2 * wobble) * (z > 60)
+    lip = _smooth(2.0, 0.7, red + 1.0 * wobble) * (z > 60)
     in_ear = _smooth(3, -1, _within(p, (55, -45, -50), (110, 40, 10), 9.0, sculpt.ear))
     eye = _spot(p, (31, -4, 74), 12)
 
-    hemoglobin = 1 + 0.6 * in_ear + sum(gain * _spot(p, at, size) for gain, at, size in FLUSHED)
+    hemoglobin = 1 + 1.1 * in_ear + sum(gain * _spot(p, at, size) for gain, at, size in FLUSHED)
     hemoglobin *= 1 + 0.45 * _mottled(p / 12, 3, 3) + 0.45 * _mottled(p / 3.4, 3, 5) + 0.2 * _mottled(p / 0.9, 2, 6)
-    hemoglobin *= 1 + 2.1 * lip * (1 + 0.5 * _mottled(p / 1.6, 2, 7))
+    hemoglobin *= 1 + 2.3 * lip * (1 + 0.5 * _mottled(p / 1.6, 2, 7))
     melanin = 1 + 0.4 * _mottled(p / 18, 3, 21) + 0.3 * _mottled(p / 2.6, 3, 23) + 0.25 * eye
     melanin += 0.2 * lip - 0.12 * _spot(p, (38, -28, 62), 16)
     where = np.clip(_spot(p, (26, -20, 76), 18) + _spot(p, (0, -14, 95), 13) + 0.3 * _spot(p, (0, 40, 80), 30), 0, 1)
@@ -81,7 +81,7 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     hairs = hair.cover(p)
     melanin *= 1 + 10 * hairs
-    hemoglobin *= 1 + 1.2 * hairs
+    hemoglobin *= 1 + 0.8 * hairs
     parting = np.interp(x, *np.array(sculpt.MOUTH_MM).T[:2])
     inside = np.exp(-(((y - parting) / 0.8) ** 2)) * _smooth(27, 23, x) * (z > 70)
     melanin, hemoglobin = melanin * (1 + 0.5 * inside), hemoglobin * (1 + 1.2 * inside)
@@ -119,7 +119,7 @@ def gloss(p: np.ndarray, lip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def porous(p: np.ndarray, lip: np.ndarray) -> np.ndarray:
     """Depth of the pores' tile at positions [..., 3], 0 to 1: deepest on nose and cheeks, least on lids and lips."""
-    much = 0.5 + 0.5 * _spot(p, (0, -34, 100), 15) + 0.35 * _spot(p, (22, -32, 80), 15) + 0.2 * _spot(p, (0, 30, 80), 30)
+    much = 0.65 + 0.35 * _spot(p, (0, -34, 100), 15) + 0.35 * _spot(p, (22, -32, 80), 15) + 0.2 * _spot(p, (0, 30, 80), 30)
     much += 0.25 * _spot(p, (0, -94, 88), 14) + 0.25 * _mottled(p / 9, 2, 77)
     return np.clip(much * (1 - 0.6 * _spot(p, (31, -3, 74), 11)) * (1 - 0.75 * lip), 0, 1)
 

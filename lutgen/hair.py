@@ -6,7 +6,7 @@ import numpy as np
 
 from lutgen import sculpt
 
-BROW_HAIRS, LASHES = 420, 95
+BROW_HAIRS, LASHES = 340, 80
 BROW_MM = ((7, 16.0), (20, 19.5), (36, 20.6), (50, 13.5))
 """Middle of a brow in x and y."""
 _STEPS = 5
@@ -22,7 +22,7 @@ def cover(p: np.ndarray) -> np.ndarray:
             at = np.stack([x[near], y[near]], axis=-1).astype("f4")
             strands = [_brow(np.random.default_rng(41 + side)), _lashes(np.random.default_rng(51 + side))]
             bare = np.prod([_bare(at, *several) for several in strands], axis=0)
-            found[near] = 1 - bare * (1 - 0.30 * _shade(at)) * (1 - _margin(at))
+            found[near] = 1 - bare * (1 - 0.22 * _shade(at)) * (1 - _margin(at))
     return found
 
 
@@ -65,8 +65,8 @@ def _brow(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     bend = -np.radians(np.interp(x, [7, 20, 50], [24, 26, 14]) + rng.normal(0, 8, BROW_HAIRS))
     edge = np.interp(x, [7, 12, 44, 50], [0.45, 1, 1, 0.6])
     return (
-        _curved(root, np.radians(lean), length, bend), 0.10 + 0.05 * rng.random(BROW_HAIRS),
-        edge * (0.35 + 0.45 * rng.random(BROW_HAIRS)),
+        _curved(root, np.radians(lean), length, bend), 0.08 + 0.05 * rng.random(BROW_HAIRS),
+        edge * (0.25 + 0.45 * rng.random(BROW_HAIRS)),
     )  # fmt: skip
 
 
@@ -76,9 +76,9 @@ def _lashes(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarra
     root = np.stack([x, np.interp(x, *np.array(sculpt.SLIT_MM).T[:2]) + 0.2], axis=-1)
     clump = np.interp(x, np.linspace(18, 47, 22), rng.normal(0, 9, 22))
     way = np.radians(np.interp(x, [18, 30, 47], [-112, -88, -42]) + clump + rng.normal(0, 4, LASHES))
-    length = np.interp(x, [18, 26, 40, 47], [2.5, 4.6, 6.4, 5.0]) * (0.65 + 0.4 * rng.random(LASHES))
+    length = np.interp(x, [18, 26, 40, 47], [1.6, 2.9, 4.4, 3.6]) * (0.65 + 0.4 * rng.random(LASHES))
     bend = np.radians(np.interp(x, [18, 30, 47], [-14, 10, 40]))
-    return _curved(root, way, length, bend), np.full(LASHES, 0.085), 0.45 + 0.35 * rng.random(LASHES)
+    return _curved(root, way, length, bend), np.full(LASHES, 0.075), 0.35 + 0.35 * rng.random(LASHES)
 
 
 def _shade(at: np.ndarray) -> np.ndarray:
@@ -93,4 +93,4 @@ def _margin(at: np.ndarray) -> np.ndarray:
     """The row of lash roots along the lid's edge."""
     x, y = at.T
     apart = y - np.interp(x, *np.array(sculpt.SLIT_MM).T[:2])
-    return 0.55 * np.exp(-((apart / 0.55) ** 2)) * np.interp(x, [16, 20, 44, 48], [0, 1, 1, 0])
+    return 0.45 * np.exp(-((apart / 0.45) ** 2)) * np.interp(x, [16, 20, 44, 48], [0, 1, 1, 0])
