@@ -69,7 +69,7 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     in_ear = _smooth(3, -1, _within(p, (55, -45, -50), (110, 40, 10), 9.0, sculpt.ear))
     eye = _spot(p, (31, -4, 74), 12)
 
-    hemoglobin = 1 + 1.1 * in_ear + sum(gain * _spot(p, at, size) for gain, at, size in FLUSHED)
+    hemoglobin = 1 + 0.8 * in_ear + sum(gain * _spot(p, at, size) for gain, at, size in FLUSHED)
     hemoglobin *= 1 + 0.45 * _mottled(p / 12, 3, 3) + 0.45 * _mottled(p / 3.4, 3, 5) + 0.2 * _mottled(p / 0.9, 2, 6)
     hemoglobin *= 1 + 2.3 * lip * (1 + 0.5 * _mottled(p / 1.6, 2, 7))
     melanin = 1 + 0.4 * _mottled(p / 18, 3, 21) + 0.3 * _mottled(p / 2.6, 3, 23) + 0.25 * eye
@@ -80,12 +80,12 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         melanin *= 1 + 2.2 * _smooth(1.25, 0.6, np.linalg.norm((p - at) * [1, 1, 0.6], axis=-1) / radius + 0.5 * wobble)
 
     hairs = hair.cover(p)
-    melanin *= 1 + 10 * hairs
-    hemoglobin *= 1 + 0.8 * hairs
+    melanin *= 1 + 17 * hairs
+    hemoglobin *= 1 + 0.4 * hairs
     parting = np.interp(x, *np.array(sculpt.MOUTH_MM).T[:2])
     inside = np.exp(-(((y - parting) / 0.8) ** 2)) * _smooth(27, 23, x) * (z > 70)
     melanin, hemoglobin = melanin * (1 + 0.5 * inside), hemoglobin * (1 + 1.2 * inside)
-    return np.clip(melanin, 0.35, 12), np.clip(hemoglobin, 0.4, 7), lip
+    return np.clip(melanin, 0.35, 20), np.clip(hemoglobin, 0.4, 7), lip
 
 
 def _spot(p: np.ndarray, center, radius_mm: float) -> np.ndarray:
@@ -112,15 +112,16 @@ def gloss(p: np.ndarray, lip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     oily = np.clip(_spot(p, (0, 30, 82), 26) + _spot(p, (0, -28, 98), 15) + 0.6 * _spot(p, (0, -92, 90), 12), 0, 1)
     dry = _spot(p, (44, -34, 55), 20)
     patchy = 1 + 0.22 * _mottled(p / 6, 3, 51) + 0.16 * _mottled(p / 1.3, 2, 53)
-    return (1 - 0.10 * oily + 0.08 * dry - 0.22 * lip) * patchy, (1 + 0.12 * oily - 0.1 * dry + 0.1 * lip) * (
+    return (1 - 0.10 * oily + 0.08 * dry - 0.04 * lip) * patchy, (1 + 0.12 * oily - 0.1 * dry - 0.1 * lip) * (
         1 + 0.5 * _mottled(p / 2.2, 3, 57)
     )
 
 
 def porous(p: np.ndarray, lip: np.ndarray) -> np.ndarray:
     """Depth of the pores' tile at positions [..., 3], 0 to 1: deepest on nose and cheeks, least on lids and lips."""
-    much = 0.65 + 0.35 * _spot(p, (0, -34, 100), 15) + 0.35 * _spot(p, (22, -32, 80), 15) + 0.2 * _spot(p, (0, 30, 80), 30)
+    much = 0.58 + 0.42 * _spot(p, (0, -34, 100), 15) + 0.35 * _spot(p, (22, -32, 80), 15) + 0.2 * _spot(p, (0, 30, 80), 30)
     much += 0.25 * _spot(p, (0, -94, 88), 14) + 0.25 * _mottled(p / 9, 2, 77)
+    much *= 0.55 + 0.45 * _smooth(20, 60, p[..., 2]) * _smooth(110, 60, p[..., 1])  # back and crown are smoother
     return np.clip(much * (1 - 0.6 * _spot(p, (31, -3, 74), 11)) * (1 - 0.75 * lip), 0, 1)
 
 

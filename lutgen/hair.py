@@ -22,7 +22,7 @@ def cover(p: np.ndarray) -> np.ndarray:
             at = np.stack([x[near], y[near]], axis=-1).astype("f4")
             strands = [_brow(np.random.default_rng(41 + side)), _lashes(np.random.default_rng(51 + side))]
             bare = np.prod([_bare(at, *several) for several in strands], axis=0)
-            found[near] = 1 - bare * (1 - 0.22 * _shade(at)) * (1 - _margin(at))
+            found[near] = 1 - bare * (1 - 0.16 * _shade(at)) * (1 - _margin(at))
     return found
 
 
@@ -57,7 +57,7 @@ def _curved(root: np.ndarray, way: np.ndarray, length: np.ndarray, bend: np.ndar
 def _brow(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Hairs rise steeply near the nose, lie down along the arch, and meet from above and below."""
     x = 7 + 43 * rng.random(BROW_HAIRS) ** 0.9
-    height = np.interp(x, [6, 11, 20, 36, 51], [2.0, 3.6, 3.4, 2.4, 0.7])
+    height = np.interp(x, [6, 11, 20, 36, 51], [1.6, 2.9, 2.9, 2.1, 0.6])
     off = np.clip(rng.normal(0, 0.5, BROW_HAIRS), -1.1, 1.1)
     root = np.stack([x, np.interp(x, *np.array(BROW_MM).T) + off * height - 0.8], axis=-1)
     lean = np.interp(x, [7, 13, 24, 36, 50], [80, 52, 26, 6, -26]) - 16 * off + rng.normal(0, 9, BROW_HAIRS)
@@ -66,7 +66,7 @@ def _brow(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     edge = np.interp(x, [7, 12, 44, 50], [0.45, 1, 1, 0.6])
     return (
         _curved(root, np.radians(lean), length, bend), 0.08 + 0.05 * rng.random(BROW_HAIRS),
-        edge * (0.25 + 0.45 * rng.random(BROW_HAIRS)),
+        edge * (0.22 + 0.4 * rng.random(BROW_HAIRS)),
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ SIDE_MM, TEXELS = 24.0, 512
 PORE_APART_MM, PORE_RADIUS_MM, PORE_DEPTH_MM = 1.15, (0.11, 0.24), (0.03, 0.09)
 LINES_MM = ((1.6, 0.22, 0.020), (0.75, 0.14, 0.011))
 """Nets of fine lines: distance between them, width and depth."""
-BUMPS_MM = ((3.2, 0.022), (1.5, 0.012), (0.6, 0.004))
+BUMPS_MM = ((3.2, 0.016), (1.5, 0.011), (0.6, 0.004))
 """Soft bumps: wavelength and root mean square height."""
 
 

@@ -72,7 +72,7 @@ void main() {
     float rough = rougher(clamp(roughness * surface.x, 0.15, 1.0), unseen), rough2 = rougher(clamp(roughness * surface.x * SECOND_LOBE, 0.1, 1.0), unseen);
     vec2 albedo = lobe_albedo(nv, rough);
 
-    vec3 sky = irradiance(mapped.xyz) * pow(vec3(open), vec3(0.8, 1.0, 1.05)) * mix(1.0, environment_entry, entry);
+    vec3 sky = irradiance(mapped.xyz) * pow(vec3(open), vec3(0.7, 1.0, 1.1)) * mix(1.0, environment_entry, entry);
     entering = vec4(sun * received * mix(1.0, entry_factor(nl), entry) + sky, -view_position.z);
     facing = vec4(normalize(view_normal), mix(1.0, exit_factor(albedo, rough), entry));
 
