@@ -42,7 +42,7 @@ def _smooth(low: float, high: float, x: np.ndarray) -> np.ndarray:
 
 
 def _within(p: np.ndarray, low, high, far: float, distance: Callable) -> np.ndarray:
-    """A distance function of x, y, z at positions inside a box (of |x|, y, z); `far` elsewhere, where it is not asked."""
+    """A distance function of x, y, z at positions in a box (of |x|, y, z); `far` elsewhere, where it is not asked."""
     q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1)
     inside = np.all((q > low) & (q < high), axis=-1)
     found = np.full(p.shape[:-1], far, "f4")
@@ -53,7 +53,7 @@ def _within(p: np.ndarray, low, high, far: float, distance: Callable) -> np.ndar
 
 FLUSHED = (
     (1.2, (42, -30, 60), 15), (1.3, (0, -37, 106), 10), (1.1, (13, -41, 94), 6), (0.6, (0, -92, 88), 13),
-    (0.8, (31, -12, 74), 8), (0.25, (0, 45, 75), 22), (0.7, (18, -4, 76), 5), (0.5, (26, -52, 82), 9),
+    (0.8, (31, -12, 74), 8), (0.1, (0, 45, 75), 22), (0.7, (18, -4, 76), 5), (0.5, (26, -52, 82), 9),
 )  # fmt: skip
 """Where more blood runs (share more, place and radius in mm): cheeks, tip and wings of the nose, chin, lids, brow."""
 MOLES = ((0.8, (34, -57, 78)), (0.8, (-22, -28, 88)), (0.7, (-46, 2, 58)), (0.6, (12, 42, 84)), (0.9, (-47, -62, 42)))
@@ -110,16 +110,17 @@ def _freckles(p: np.ndarray, share: np.ndarray) -> np.ndarray:
 def gloss(p: np.ndarray, lip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ratios of roughness and specular at positions [..., 3]."""
     oily = np.clip(_spot(p, (0, 30, 82), 26) + _spot(p, (0, -28, 98), 15) + 0.6 * _spot(p, (0, -92, 90), 12), 0, 1)
-    dry = _spot(p, (44, -34, 55), 20)
-    patchy = 1 + 0.22 * _mottled(p / 6, 3, 51) + 0.16 * _mottled(p / 1.3, 2, 53)
-    return (1 - 0.10 * oily + 0.08 * dry - 0.04 * lip) * patchy, (1 + 0.12 * oily - 0.1 * dry - 0.1 * lip) * (
-        1 + 0.5 * _mottled(p / 2.2, 3, 57)
-    )
+    dry = np.clip(_spot(p, (44, -34, 55), 20) + _spot(p, (31, -1, 75), 9) + 0.5 * _smooth(60, 20, p[..., 2]), 0, 1)
+    patchy = 1 + 0.2 * _mottled(p / 6, 3, 51) + 0.16 * _mottled(p / 1.3, 2, 53)
+    share = (1 + 0.15 * oily - 0.28 * dry - 0.1 * lip) * (1 + 0.2 * _mottled(p / 2.2, 3, 57))
+    return (1 - 0.10 * oily + 0.12 * dry - 0.04 * lip) * patchy, share
 
 
 def porous(p: np.ndarray, lip: np.ndarray) -> np.ndarray:
     """Depth of the pores' tile at positions [..., 3], 0 to 1: deepest on nose and cheeks, least on lids and lips."""
-    much = 0.58 + 0.42 * _spot(p, (0, -34, 100), 15) + 0.35 * _spot(p, (22, -32, 80), 15) + 0.2 * _spot(p, (0, 30, 80), 30)
+    much = (
+        0.58 + 0.42 * _spot(p, (0, -34, 100), 15) + 0.35 * _spot(p, (22, -32, 80), 15) + 0.2 * _spot(p, (0, 30, 80), 30)
+    )
     much += 0.25 * _spot(p, (0, -94, 88), 14) + 0.25 * _mottled(p / 9, 2, 77)
     much *= 0.55 + 0.45 * _smooth(20, 60, p[..., 2]) * _smooth(110, 60, p[..., 1])  # back and crown are smoother
     return np.clip(much * (1 - 0.6 * _spot(p, (31, -3, 74), 11)) * (1 - 0.75 * lip), 0, 1)
@@ -132,7 +133,9 @@ def bumps(p: np.ndarray, lip: np.ndarray) -> np.ndarray:
     """
     height = 0.10 * _mottled(p / 5, 2, 71) + 0.035 * _mottled(p / 1.6, 2, 73) + _wrinkles(p)
     bent = p + 1.2 * np.stack([_mottled(p / 4, 2, seed) for seed in (81, 82, 83)], axis=-1)
-    furrows = np.abs(_noise(bent * [1 / 1.5, 1 / 9, 1 / 9], 85) - 0.5) + 0.5 * np.abs(_noise(bent * [1.3, 0.2, 0.2], 86) - 0.5)
+    furrows = np.abs(_noise(bent * [1 / 1.5, 1 / 9, 1 / 9], 85) - 0.5) + 0.5 * np.abs(
+        _noise(bent * [1.3, 0.2, 0.2], 86) - 0.5
+    )
     height = height * (1 - lip) + lip * (0.42 * np.minimum(furrows, 0.3) + 0.06 * _mottled(p / 1.2, 2, 87))
     texel = [np.linalg.norm(np.gradient(p, axis=k), axis=-1) for k in (1, 0)]
     slope = [np.gradient(height, axis=k) / np.clip(t, 0.1, 2.0) for k, t in zip((1, 0), texel, strict=True)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from lutgen import sculpt
@@ -36,7 +38,7 @@ def _bare(at: np.ndarray, lines: np.ndarray, radius_mm: np.ndarray, strength: np
         some = order[np.searchsorted(sorted_x, low) : np.searchsorted(sorted_x, high)]
         some = some[np.abs(at[some, 1] - line[:, 1].mean()) < 0.6 + np.ptp(line[:, 1])]
         q, least, along = at[some], np.full(len(some), 9.0, "f4"), np.zeros(len(some), "f4")
-        for k, (a, b) in enumerate(zip(line[:-1], line[1:], strict=True)):
+        for k, (a, b) in enumerate(pairwise(line)):
             t = np.clip((q - a) @ (b - a) / ((b - a) @ (b - a) + 1e-9), 0, 1)
             apart = np.hypot(*(q - a - t[:, None] * (b - a)).T)
             nearer = apart < least

@@ -45,7 +45,8 @@ def cache_folder() -> Path:
 def cached(name: str, make) -> dict[str, np.ndarray]:
     """Arrays that `make` gives, kept under the hash of the sources; a cache that fails costs only time."""
     text = "".join(
-        (files("lutgen") / f"{module}.py").read_text() for module in ("head", "sculpt", "painting", "complexion", "hair")
+        (files("lutgen") / f"{module}.py").read_text()
+        for module in ("head", "sculpt", "painting", "complexion", "hair")
     )
     path = cache_folder() / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
     with contextlib.suppress(Exception), np.load(path) as kept:  # any damage: make it again
@@ -86,7 +87,7 @@ def _make() -> dict[str, np.ndarray]:
 
 
 def unfolded(uv: np.ndarray, triangles: np.ndarray, movable: np.ndarray, rounds: int = 8) -> np.ndarray:
-    """Texture coordinates [V, 2] in which no movable triangle [T, 3] lies upside down on others, as the ear's back would.
+    """Texture coordinates [V, 2] in which no movable triangle [T, 3] lies upside down on others, as behind an ear.
 
     Around those that do, each vertex moves to the middle of its neighbors (Tutte 1963), wider in every round.
     """

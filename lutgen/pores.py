@@ -67,7 +67,7 @@ def _pores(rng: np.random.Generator) -> np.ndarray:
 
 
 def _lines(rng: np.random.Generator, apart_mm: float, width_mm: float, depth_mm: float) -> np.ndarray:
-    """Grooves between the cells of a net: where the nearest and the second nearest place are as far (Worley 1996), bent a little."""
+    """Grooves between the cells of a net: the two nearest places are as far there (Worley 1996); bent a little."""
     places = _scattered(rng, apart_mm)
     n = len(places)
     at = (np.arange(TEXELS) + 0.5) * SIDE_MM / TEXELS
@@ -80,7 +80,8 @@ def _lines(rng: np.random.Generator, apart_mm: float, width_mm: float, depth_mm:
         shift = SIDE_MM * np.stack(np.broadcast_arrays((row // n)[:, None], (column // n)[None]), axis=-1)
         found.append(np.hypot(*np.moveaxis(around + shift - bent, -1, 0)))
     first, second = np.partition(np.array(found), 1, axis=0)[:2]
-    return -depth_mm * np.exp(-(((second - first) / width_mm) ** 2))
+    grooves = -depth_mm * np.exp(-(((second - first) / width_mm) ** 2))
+    return np.roll(grooves, rng.integers(0, TEXELS, 2), axis=(0, 1))  # else the nets' cells would end at one line
 
 
 def _bumps(rng: np.random.Generator, wavelength_mm: float, rms_mm: float) -> np.ndarray:

@@ -42,17 +42,17 @@ class Look:
     light_azimuth: float = -30.0
     light_elevation: float = 36.0
     light: float = 4.2
-    light_size: float = 3.5
+    light_size: float = 2.5
     environment: float = 0.85
     roughness: float = 0.5
     specular: float = 1.0
     bumps: float = 1.0
     exposure: float = 0.0
     azimuth: float = 18.0
-    elevation: float = 3.0
+    elevation: float = 0.0
     distance_mm: float = 545.0
     field_of_view: float = 23.0
-    target_mm: tuple[float, float, float] = (4.0, -12.0, 0.0)
+    target_mm: tuple[float, float, float] = (0.0, -12.0, 0.0)
 
     def __post_init__(self):
         for name, (low, high) in RANGES.items():

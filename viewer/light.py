@@ -9,8 +9,8 @@ import numpy as np
 REFRACTIVE_INDEX = 1.4
 STUDIO = (  # direction, sharpness, color times strength
     ((-0.55, 0.60, 0.58), 14.0, (3.00, 2.90, 2.75)),
-    ((0.90, 0.20, 0.40), 10.0, (0.70, 0.82, 0.95)),
-    ((0.62, 0.30, -0.72), 18.0, (4.20, 4.10, 4.00)),
+    ((0.90, 0.20, 0.40), 10.0, (0.78, 0.80, 0.82)),
+    ((0.62, 0.30, -0.72), 28.0, (3.20, 3.10, 3.00)),
 )
 """Soft boxes: exp(sharpness (cos - 1)) lobes, linear ACEScg."""
 _GROUND, _SKY = np.array([0.088, 0.083, 0.080]), np.array([0.29, 0.31, 0.335])

@@ -178,7 +178,7 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
     fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
     gl.put(
         program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
-        shadow_offset_mm=0.6, pore_side_mm=pores.SIDE_MM,
+        shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
         light_direction=scene.light_direction(look), light_color=look.light * SUN, eye=camera.eye_mm,
         chromophores=(look.melanin, look.eumelanin, look.hemoglobin), contrast=(fade**0.38, fade**0.15),
         chromophores_low=tuple(a.low for a in axes), chromophores_high=tuple(a.high for a in axes),

@@ -9,7 +9,7 @@ uniform vec3 light_direction, light_color, eye;
 uniform vec3 chromophores;        // melanin, eumelanin, hemoglobin: what the maps multiply
 uniform vec3 chromophores_low, chromophores_high;  // what the LUT set covers
 uniform vec2 contrast;            // exponents of the melanin and hemoglobin ratios: freckles fade on dark skin
-uniform float roughness, specular, bumps, entry, transmission, light_radius, shadow_bias, environment_entry;
+uniform float roughness, specular, bumps, entry, transmission, light_radius, shadow_bias, environment_entry, light_range_mm;
 in vec3 view_position, view_normal, world_position, world_normal;
 in vec2 texcoord;
 in vec3 light_position;
@@ -86,6 +86,8 @@ void main() {
     vec3 around = mix(reflected(mirror, rough) * environment_lobe(albedo),
                       reflected(mirror, rough2) * environment_lobe(lobe_albedo(nv, rough2)), SECOND_WEIGHT);
     vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + grazing * mix(1.0, 0.6, pow(1.0 - nv, 2.0)) * around;
-    float behind = transmission * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0);
+    // Only where the far side is what the light meets first: no glow in nostrils that the nose shades.
+    float covered = (light_position.z - textureLod(shadow_map, light_position.xy, 0.0).r) * light_range_mm;
+    float behind = transmission * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0) * (1.0 - smoothstep(1.5, 3.0, covered / (surface.w * 32.0 + 1.5)));
     reflected_light = vec4(specular * surface.y * gloss, behind);
 }
