@@ -85,6 +85,8 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     parting = np.interp(x, *np.array(sculpt.MOUTH_MM).T[:2])
     inside = np.exp(-(((y - parting) / 0.8) ** 2)) * _smooth(27, 23, x) * (z > 70)
     melanin, hemoglobin = melanin * (1 + 0.5 * inside), hemoglobin * (1 + 1.2 * inside)
+    nostril = _smooth(1.15, 0.75, np.linalg.norm((np.stack([x, y, z], -1) - (6.4, -40.5, 94.5)) / (4, 6.5, 7), axis=-1))
+    melanin *= 1 + 9 * nostril * (y < -38)  # hairs and depth: no light comes back out
     return np.clip(melanin, 0.35, 20), np.clip(hemoglobin, 0.4, 7), lip
 
 

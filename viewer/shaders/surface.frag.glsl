@@ -88,6 +88,6 @@ void main() {
     vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + grazing * mix(1.0, 0.6, pow(1.0 - nv, 2.0)) * around;
     // Only where the far side is what the light meets first: no glow in nostrils that the nose shades.
     float covered = (light_position.z - textureLod(shadow_map, light_position.xy, 0.0).r) * light_range_mm;
-    float behind = transmission * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0) * (1.0 - smoothstep(1.5, 3.0, covered / (surface.w * 32.0 + 1.5)));
+    float behind = transmission * open * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0) * (1.0 - smoothstep(1.5, 3.0, covered / (surface.w * 32.0 + 1.5)));
     reflected_light = vec4(specular * surface.y * gloss, behind);
 }
