@@ -80,7 +80,7 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         melanin *= 1 + 2.2 * _smooth(1.25, 0.6, np.linalg.norm((p - at) * [1, 1, 0.6], axis=-1) / radius + 0.5 * wobble)
 
     hairs = hair.cover(p)
-    melanin *= 1 + 17 * hairs
+    melanin *= 1 + 17 * hairs**1.7  # color falls steeply with the first melanin: half a hair is no orange one
     hemoglobin *= 1 + 0.4 * hairs
     parting = np.interp(x, *np.array(sculpt.MOUTH_MM).T[:2])
     inside = np.exp(-(((y - parting) / 0.8) ** 2)) * _smooth(27, 23, x) * (z > 70)

@@ -42,7 +42,7 @@ class Look:
     light_azimuth: float = -30.0
     light_elevation: float = 36.0
     light: float = 4.2
-    light_size: float = 2.5
+    light_size: float = 1.5
     environment: float = 0.85
     roughness: float = 0.5
     specular: float = 1.0
