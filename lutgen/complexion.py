@@ -52,8 +52,8 @@ def _within(p: np.ndarray, low, high, far: float, distance: Callable) -> np.ndar
 
 
 FLUSHED = (
-    (1.2, (42, -30, 60), 15), (1.3, (0, -37, 106), 10), (1.1, (13, -41, 94), 6), (0.6, (0, -92, 88), 13),
-    (0.8, (31, -12, 74), 8), (0.1, (0, 45, 75), 22), (0.7, (18, -4, 76), 5), (0.5, (26, -52, 82), 9),
+    (1.5, (42, -30, 60), 14), (1.3, (0, -37, 106), 10), (1.1, (13, -41, 94), 6), (0.6, (0, -92, 88), 13),
+    (0.8, (31, -12, 74), 8), (-0.12, (0, 50, 78), 24), (0.7, (18, -4, 76), 5), (0.5, (26, -52, 82), 9),
 )  # fmt: skip
 """Where more blood runs (share more, place and radius in mm): cheeks, tip and wings of the nose, chin, lids, brow."""
 MOLES = ((0.8, (34, -57, 78)), (0.8, (-22, -28, 88)), (0.7, (-46, 2, 58)), (0.6, (12, 42, 84)), (0.9, (-47, -62, 42)))
@@ -71,16 +71,16 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     hemoglobin = 1 + 0.8 * in_ear + sum(gain * _spot(p, at, size) for gain, at, size in FLUSHED)
     hemoglobin *= 1 + 0.45 * _mottled(p / 12, 3, 3) + 0.45 * _mottled(p / 3.4, 3, 5) + 0.2 * _mottled(p / 0.9, 2, 6)
-    hemoglobin *= 1 + 2.3 * lip * (1 + 0.5 * _mottled(p / 1.6, 2, 7))
+    hemoglobin *= 1 + 3.4 * lip * (1 + 0.5 * _mottled(p / 1.6, 2, 7))
     melanin = 1 + 0.4 * _mottled(p / 18, 3, 21) + 0.3 * _mottled(p / 2.6, 3, 23) + 0.25 * eye
-    melanin += 0.2 * lip - 0.12 * _spot(p, (38, -28, 62), 16)
+    melanin -= 0.1 * lip + 0.12 * _spot(p, (38, -28, 62), 16)
     where = np.clip(_spot(p, (26, -20, 76), 18) + _spot(p, (0, -14, 95), 13) + 0.3 * _spot(p, (0, 40, 80), 30), 0, 1)
     melanin *= 1 + 0.9 * _freckles(p, where + 0.04)
     for radius, at in MOLES:
         melanin *= 1 + 2.2 * _smooth(1.25, 0.6, np.linalg.norm((p - at) * [1, 1, 0.6], axis=-1) / radius + 0.5 * wobble)
 
     hairs = hair.cover(p)
-    melanin *= 1 + 17 * hairs**1.7  # color falls steeply with the first melanin: half a hair is no orange one
+    melanin *= 1 + 17 * hairs**1.35  # color falls steeply with the first melanin: half a hair is no orange one
     hemoglobin *= 1 + 0.4 * hairs
     parting = np.interp(x, *np.array(sculpt.MOUTH_MM).T[:2])
     inside = np.exp(-(((y - parting) / 0.8) ** 2)) * _smooth(27, 23, x) * (z > 70)

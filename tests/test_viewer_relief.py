@@ -141,3 +141,19 @@ def test_the_tile_repeats_every_so_many_millimetres(plane):
     one = layer(plane, "entering", **values)
     two = layer(plane, "entering", **(values | {"target_mm": (pores.SIDE_MM, 0, 0)}))
     assert np.abs(one[..., 0] - two[..., 0]).max() < 0.02 * one[..., 0].mean()
+
+
+@pytest.mark.parametrize(("blocked", "least", "most"), [(False, 0.5, 1.0), (True, 0.0, 0.01)])
+def test_a_thin_part_glows_only_where_the_light_meets_it_first(blocked, least, most):
+    """Light from behind a sheet of 1 mm; another sheet 60 mm behind takes it away."""
+    corners = np.array([[-500, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]], "f4")
+    corners = np.concatenate([corners, corners - [0, 0, 60]] if blocked else [corners])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], "i4")
+    triangles = np.concatenate([triangles, triangles + 4] if blocked else [triangles])
+    sheet = Mesh(corners, np.tile(np.array([0, 0, 1], "f4"), (len(corners), 1)), None, triangles)
+    surface = np.ones((1, 1, 4), "f4")
+    surface[..., 3] = 1 / 32
+    stage = app.open_stage(lutgen.load(), sheet, Maps(surface=surface), (160, 160))
+    glow = layer(stage, "reflected", light_azimuth=180, light_elevation=0, distance_mm=300)[150:170, 150:170, 3]
+    passes.release(stage)
+    assert least <= glow.min() <= glow.max() <= most
