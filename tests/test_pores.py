@@ -6,13 +6,22 @@ import pytest
 from lutgen import complexion, hair, pores
 
 
-def test_the_tile_repeats_without_a_seam():
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_tile_repeats_without_a_seam(axis):
+    """From one line of texels to the next, the last and the first too, no net, bump or pore steps as a cut would.
+
+    Mean square of the steps against the median line's: 2.8 at most as it is, 4.8 and 13 with a cut in a net of lines.
+    """
+    rng = np.random.default_rng(5)
+    parts = [pores._pores(rng), *(pores._lines(rng, *net) for net in pores.LINES_MM)]
+    parts += [pores._bumps(rng, *bump) for bump in pores.BUMPS_MM]
+    for part in parts[1:]:
+        steps = ((np.roll(part, 1, axis) - part) ** 2).mean(axis=1 - axis)
+        assert steps.max() < 4 * np.median(steps)
     height, _ = pores.height_mm()
-    for axis in (0, 1):
-        inside = np.abs(np.diff(height, axis=axis))
-        across = np.abs(np.take(height, 0, axis) - np.take(height, -1, axis))
-        assert across.max() <= inside.max()
-        assert across.mean() <= inside.mean(axis=1 - axis).max()
+    inside, across = np.abs(np.diff(height, axis=axis)), np.abs(np.take(height, 0, axis) - np.take(height, -1, axis))
+    assert across.max() <= inside.max()
+    assert across.mean() <= inside.mean(axis=1 - axis).max()
 
 
 def test_it_is_flat_on_the_whole_and_no_deeper_than_skin():
