@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 REFRACTIVE_INDEX = 1.4
 STUDIO = (  # direction, sharpness, color times strength
-    ((0.45, 0.55, 0.70), 14.0, (3.20, 3.10, 2.94)),
-    ((-0.85, 0.25, 0.45), 10.0, (0.83, 0.96, 1.10)),
-    ((0.30, 0.35, -0.90), 20.0, (2.50, 2.38, 2.25)),
+    ((-0.55, 0.60, 0.58), 14.0, (3.00, 2.90, 2.75)),
+    ((0.90, 0.20, 0.40), 10.0, (0.78, 0.80, 0.82)),
+    ((0.62, 0.30, -0.72), 28.0, (3.20, 3.10, 3.00)),
 )
 """Soft boxes: exp(sharpness (cos - 1)) lobes, linear ACEScg."""
 _GROUND, _SKY = np.array([0.088, 0.083, 0.080]), np.array([0.29, 0.31, 0.335])
@@ -38,7 +40,8 @@ def constants() -> str:
         f"const float STUDIO_SHARPNESS[{count}] = float[]({', '.join(f'{s:.1f}' for _, s, _ in STUDIO)});",
         f"const vec3 STUDIO_DIRECTION[{count}] = vec3[]({vectors(ways)});",
         f"const vec3 STUDIO_COLOR[{count}] = vec3[]({vectors(c for _, _, c in STUDIO)});",
-        f"const float EXIT_MEAN = {exit_mean():.9g};",
+        f"const int EXIT_MEANS = {len(exit_means())};",
+        f"const float EXIT_MEAN[EXIT_MEANS] = float[]({', '.join(f'{m:.9g}' for m in exit_means())});",
     ])  # fmt: skip
 
 
@@ -74,11 +77,22 @@ def exit_mean() -> float:
     return float(((1 - fresnel(c)) * c * w).sum())
 
 
+def exit_means() -> np.ndarray:
+    """The same for rough skin, by roughness evenly from 0 to 1 [32]: mean of what one GGX lobe does not reflect."""
+    table = ggx_albedo()
+    whole, part = table[..., 0], table[..., 1]
+    f0 = fresnel(np.ones(1))
+    kept = (f0 * (whole - part) + part) * (1 + f0 * (1 / np.maximum(whole, 1e-6) - 1))
+    root = np.linspace(0, 1, table.shape[1])
+    return np.trapezoid((1 - kept) * 4 * root**3, root, axis=1)
+
+
 def entry_of_the_sky() -> float:
     """What an even sky enters with, relative to light along the normal."""
     return exit_mean() / float(1 - fresnel(np.ones(1))[0])
 
 
+@cache
 def ggx_albedo(size: int = 32, samples: int = 48) -> np.ndarray:
     """Directional albedo [roughness, root of cosine, 2] of one GGX lobe: at F = 1, and weighted with (1 - v.h)^5.
 

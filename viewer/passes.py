@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
-from lutgen import color, scene
+from lutgen import color, pores, scene
 from lutgen.errors import InputError, in_range
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
@@ -84,7 +84,7 @@ def open_stage(
     stage = Stage(
         size, sides, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
-        {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
+        {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS} | {"pores": _map(pores.texture(), (), 1.0)},
         light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx,
     )  # fmt: skip
     resize(stage, size)
@@ -108,7 +108,7 @@ def side(stage: Stage, split: str) -> Side:
     return stage.sides["none" if split == "scattering" else split]
 
 
-def _map(values: np.ndarray | None, plain: tuple[float, ...]) -> moderngl.Texture:
+def _map(values: np.ndarray | None, plain: tuple[float, ...], anisotropy: float = 2.0) -> moderngl.Texture:
     """A filtered texture of a map in 0 to 1 (8-bit) or of floats; of one plain texel where there is none."""
     values = np.array([[plain]], "f4") if values is None else values
     if values.ndim == 2:
@@ -118,7 +118,7 @@ def _map(values: np.ndarray | None, plain: tuple[float, ...]) -> moderngl.Textur
     made = gl.context().texture((data.shape[1], data.shape[0]), data.shape[2], data.tobytes(), alignment=1, dtype=kind)
     made.build_mipmaps()
     made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    made.anisotropy = 8.0
+    made.anisotropy = anisotropy
     return made
 
 
@@ -215,15 +215,20 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
     buffer.use()
     buffer.clear(0.0, 0.0, 0.0, 0.0)
     gl.context().enable_only(moderngl.DEPTH_TEST)
+    gl.context().depth_func = "<="
+    clip = camera.projection @ camera.view
+    gl.put(stage.shadow, light_clip=clip)
+    stage.head_shadow.render()  # depth alone first: then no pixel is shaded twice
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
-            surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], shadow_map=stage.targets["cast"],
+            surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], pore_map=stage.maps["pores"],
+            shadow_map=stage.targets["cast"],
             environment_map=stage.environment_map, ggx_albedo=stage.ggx)  # fmt: skip
     grid = stage.sides["none"].luts.color_lut.grid
     axes = grid.melanin, grid.eumelanin, grid.hemoglobin
     fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
     gl.put(
-        program, view=camera.view, projection=camera.projection, light_clip=_light_clip(stage, look),
-        shadow_offset_mm=0.6,
+        program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
+        shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
         light_direction=scene.light_direction(look), light_color=look.light * SUN, eye=camera.eye_mm,
         chromophores=(look.melanin, look.eumelanin, look.hemoglobin), contrast=(fade**0.38, fade**0.15),
         chromophores_low=tuple(a.low for a in axes), chromophores_high=tuple(a.high for a in axes),
