@@ -84,6 +84,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
         command.add_argument("--mesh", metavar="FILE", help="GLB, glTF, OBJ or lee-perry-smith (default: built-in)")
         command.add_argument("--mm-per-unit", type=float, help="millimetres per unit of the mesh (default: a guess)")
+        command.add_argument("--flip-v", action="store_true", help="turn the mesh's texture coordinates upside down")
         command.add_argument("--maps", metavar="DIR", help="texture maps by name: melanin.png, normal.png, ...")
         command.add_argument("--look", metavar="FILE", help="look that the viewer saved (TOML)")
         command.add_argument("--preset", help="chromophores of a preset: light, dark, ...")

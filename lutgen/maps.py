@@ -89,8 +89,12 @@ def _picture(path: Path) -> np.ndarray:
         raise InputError(f"map {path}: not a picture that can be read ({error})") from error
 
 
-def load(folder: Path) -> Maps:
-    """The maps that a folder holds, by name (`melanin.png`, `thickness.exr` ...); InputError where there is none."""
+def load(folder: Path, under: Maps | None = None) -> Maps:
+    """The maps that a folder holds, by name (`melanin.png`, `thickness.exr` ...); InputError where there is none.
+
+    Each replaces that one map of `under`, the others stay: an occlusion map leaves the thickness that was there. An
+    albedo takes the place of the chromophores under it, for lips and freckles are painted into it already.
+    """
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"maps = {folder}: there is no such folder")
@@ -103,10 +107,12 @@ def load(folder: Path) -> Maps:
     if not found:
         raise InputError(f"maps = {folder}: holds none of {', '.join(NAMES)} (as {', '.join(SUFFIXES)})")
     values = {name: _decoded(name, *read(path)) for name, path in found.items()}
+    below = under or Maps()
     return Maps(
-        _together(values, dict.fromkeys(RATIOS, 1.0)),
-        _together(values, {"roughness": 1.0, "specular": 1.0, "occlusion": 1.0, "thickness": 1.0}),
-        _color(values.get("normal")), _color(values.get("albedo")),
+        _together(values, RATIOS, None if "albedo" in values else below.chromophores),
+        _together(values, SURFACE, below.surface),
+        _color(values["normal"]) if "normal" in values else below.normal,
+        _color(values["albedo"]) if "albedo" in values else below.albedo,
     )  # fmt: skip
 
 
@@ -122,24 +128,29 @@ def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:
     return decode_ratio(values) if name in RATIOS else values * (SURFACE_RANGE if name in SURFACE[:2] else 1.0)
 
 
-def _color(values: np.ndarray | None) -> np.ndarray | None:
-    return None if values is None else np.broadcast_to(values, (*values.shape[:2], 3))
+def _color(values: np.ndarray) -> np.ndarray:
+    return np.broadcast_to(values, (*values.shape[:2], 3))
 
 
-def _together(values: dict[str, np.ndarray], plain: dict[str, float]) -> np.ndarray | None:
-    """Maps of one texture stacked [rows, columns, channels] at the size of the largest; None if none is given."""
-    present = [values[name] for name in plain if name in values]
+def _together(values: dict[str, np.ndarray], names: tuple[str, ...], below: np.ndarray | None) -> np.ndarray | None:
+    """Maps of one texture stacked [rows, columns, channels] at the size of the largest; None where there is none.
+
+    What is not given is what lies below, else 1.
+    """
+    layers = [
+        values[name] if name in values else None if below is None else below[..., k] for k, name in enumerate(names)
+    ]
+    present = [layer for layer in layers if layer is not None]
     if not present:
         return None
     rows, columns = (max(v.shape[k] for v in present) for k in (0, 1))
-    layers = [
-        resized(values[n], rows, columns) if n in values else np.full((rows, columns), v) for n, v in plain.items()
-    ]
-    return np.stack(layers, axis=-1)
+    return np.stack([np.ones((rows, columns)) if v is None else resized(v, rows, columns) for v in layers], axis=-1)
 
 
 def resized(values: np.ndarray, rows: int, columns: int) -> np.ndarray:
     """A map [R, C] read linearly at another size."""
+    if values.shape == (rows, columns):
+        return values
     down = np.clip((np.arange(rows) + 0.5) / rows * values.shape[0] - 0.5, 0, values.shape[0] - 1)
     across = np.clip((np.arange(columns) + 0.5) / columns * values.shape[1] - 0.5, 0, values.shape[1] - 1)
     by_row = np.array([np.interp(down, np.arange(values.shape[0]), values[:, k]) for k in range(values.shape[1])])

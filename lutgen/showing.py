@@ -49,7 +49,7 @@ def _stage(options: Namespace, size: str):
     app = _viewer("app")
     pixels = app.size_of(options.size or size)
     luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
-    shape, given = app.model(options.mesh, options.mm_per_unit, options.maps)
+    shape, given = app.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
     return app, luts, shape, given, pixels
 
 

@@ -20,10 +20,11 @@ LEVELS = [
     {"baking"},
     {"solvers"},
     {"painting"},
+    {"placing"},
     {"probing", "head", "maps"},
     {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
-    {"axes", "tissue", "color", "sculpt"},
+    {"axes", "tissue", "color", "sculpt", "surroundings", "cache"},
     {"chromophores"},
     {"errors"},
 ]

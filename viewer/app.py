@@ -32,28 +32,24 @@ def size_of(text: str) -> tuple[int, int]:
     return width, height
 
 
-def model(name: str | None, mm_per_unit: float | None, folder: str | None) -> tuple[Mesh, Maps]:
-    """The head and its maps: built-in without a name; maps from a folder, else painted where the head can be."""
-    if name is None:
-        shape = head.builtin()
-        given = Maps(**painting.paint(shape)) if folder is None else maps.load(Path(folder))
-        return shape, given
-    shape = mesh.scan(name) if name in mesh.SCANS else mesh.load(Path(name), mm_per_unit)
-    found = Maps(normal=_texture(shape, "normal"), albedo=_linear(_texture(shape, "albedo")))
+def model(name: str | None, mm_per_unit: float | None, folder: str | None, flip_v: bool = False) -> tuple[Mesh, Maps]:
+    """The head and its maps: built-in without a name; painted maps, under the file's own, under those of a folder.
+
+    Skin that is painted into an albedo is not painted a second time: beside one, lips and freckles are its own, and
+    only gloss, pores, open sky and thickness are generated.
+    """
+    shape = head.builtin() if name is None else mesh.of(name, mm_per_unit, flip_v)
+    found = Maps(**painting.paint(shape))
+    if "albedo" in shape.textures:
+        found = replace(found, chromophores=None, albedo=_linear(shape.textures["albedo"]))
+    if "normal" in shape.textures:
+        found = replace(found, normal=shape.textures["normal"])
     if folder is not None:
-        more = maps.load(Path(folder))
-        found = replace(found, **{k: v for k, v in vars(more).items() if v is not None})
-    return shape, found
+        found = maps.load(Path(folder), found)
+    return replace(shape, notes=(*shape.notes, *painting.notes(shape))), found
 
 
-def _texture(shape: Mesh, name: str) -> np.ndarray | None:
-    picture = shape.textures.get(name)
-    return None if picture is None else np.ascontiguousarray(picture[..., :3])
-
-
-def _linear(srgb: np.ndarray | None) -> np.ndarray | None:
-    if srgb is None:
-        return None
+def _linear(srgb: np.ndarray) -> np.ndarray:
     v = srgb / 255.0
     return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
 
