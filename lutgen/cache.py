@@ -32,7 +32,7 @@ def kept(
     path = folder() / f"{name}-{mark.hexdigest()[:16]}.npz"
     with contextlib.suppress(Exception), np.load(path) as found:  # any damage: make it again
         return {key: found[key] for key in found.files}
-    made = make()
+    made: dict = make()
     partial = path.with_name(f".{path.name}.{os.getpid()}")
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)

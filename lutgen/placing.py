@@ -17,6 +17,8 @@ import numpy as np
 from lutgen import head, surroundings
 from lutgen.mesh import Mesh
 
+Profile = tuple[np.ndarray, np.ndarray]
+"""Heights and the foremost z at each."""
 _CELL_MM = 2.0
 _SCALES = np.geomspace(0.7, 1.45, 49)
 _BELOW_MM, _ABOVE_MM = 78, 75
@@ -149,12 +151,17 @@ def _smoothed(values: np.ndarray, passes: int = 3) -> np.ndarray:
     for turn in range(40):
         if turn >= passes and known.all():
             break
-        sums = [sum(np.pad(v, 1, mode="edge")[i : i + v.shape[0], j : j + v.shape[1]] for i, j in np.ndindex(3, 3))
-                for v in (values * known, known)]  # fmt: skip
-        fresh = np.where(sums[1] > 0, sums[0] / np.maximum(sums[1], 1e-9), 0.0)
+        total, count = _of_nine(values * known), _of_nine(known)
+        fresh = np.where(count > 0, total / np.maximum(count, 1e-9), 0.0)
         values = fresh if turn < passes else np.where(known > 0, values, fresh)
-        known = (sums[1] > 0).astype(float)
+        known = np.where(count > 0, 1.0, 0.0)
     return values
+
+
+def _of_nine(values: np.ndarray) -> np.ndarray:
+    wide = np.pad(values, 1, mode="edge")
+    rows = wide[:-2] + wide[1:-1] + wide[2:]
+    return rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]
 
 
 def _middle(points: np.ndarray) -> float:
@@ -173,7 +180,7 @@ def _middle(points: np.ndarray) -> float:
     return float(extent[0, 0] + (min(best)[1] + 1) / 2 * _CELL_MM)
 
 
-def _profile(points: np.ndarray, middle: float) -> tuple[np.ndarray, np.ndarray]:
+def _profile(points: np.ndarray, middle: float) -> Profile:
     """Heights every millimeter, rising, and the foremost z within 2.5 mm of the midline at each; gaps bridged."""
     near = points[1:, np.abs(points[0] - middle) < 2.5]
     low = np.floor(near[0].min())
@@ -186,7 +193,7 @@ def _profile(points: np.ndarray, middle: float) -> tuple[np.ndarray, np.ndarray]
     return y, np.convolve(np.pad(z, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
 
 
-def _tip(own, known) -> tuple[float, float] | None:
+def _tip(own: Profile, known: Profile) -> tuple[float, float] | None:
     """Height of the nose's tip on a profile, and the scale at which the profile fits best; None where none fits."""
     y, z = own
     reach = 12
@@ -195,13 +202,13 @@ def _tip(own, known) -> tuple[float, float] | None:
     top = known[1].argmax()
     off = np.arange(-_BELOW_MM, _ABOVE_MM + 1)
     expected = known[1][top + off] - known[1][top]
-    usual = np.subtract(*np.array(_features(*known, float(known[0][top]), 1.0))[[-1, 0]])
+    usual = _size(*known, float(known[0][top]), 1.0)
     best = (np.inf, 0.0, 1.0)
     for k in candidates:
         scales = _SCALES[(y[k] - _BELOW_MM * _SCALES > y[0]) & (y[k] + _ABOVE_MM * _SCALES < y[-1])]
         for scale in scales:
             found = (np.interp(y[k] + scale * off, y, z) - z[k]) / scale
-            size = np.subtract(*np.array(_features(y, z, y[k], scale))[[-1, 0]]) / usual
+            size = _size(y, z, float(y[k]), float(scale)) / usual
             misfit = np.minimum(np.abs(found - expected), _WORST_MM).mean() + _UNLIKE_MM * abs(np.log(size / scale))
             best = min(best, (float(misfit), float(y[k]), float(scale)))
     return best[1:] if best[0] < _MISFIT_MM else None
@@ -210,7 +217,13 @@ def _tip(own, known) -> tuple[float, float] | None:
 _TIP = 5
 
 
-def _landmarks(own, known, tip: float, scale: float) -> np.ndarray | None:
+def _size(y: np.ndarray, z: np.ndarray, tip: float, scale: float) -> float:
+    """From the lowest of a profile's landmarks to the highest."""
+    features = _features(y, z, tip, scale)
+    return features[-1] - features[0]
+
+
+def _landmarks(own: Profile, known: Profile, tip: float, scale: float) -> np.ndarray | None:
     """Heights [7, 2] in the mesh and in the frame, rising: menton, pogonion, fold, mouth, subnasale, tip, sellion."""
     first = _features(*known, float(known[0][known[1].argmax()]), 1.0)
     second = _features(*own, tip, scale)

@@ -79,7 +79,7 @@ def sampled(p: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.nd
     points, facing = [], []
     for i, j in np.unique(np.minimum(parts, len(counts) - 1).T, axis=0):
         group = np.flatnonzero((parts[0] == i) & (parts[1] == j))
-        a, b = (v.ravel() for v in np.meshgrid(*((np.arange(counts[k]) + 0.5) / counts[k] for k in (i, j))))
+        a, b = (v.ravel() for v in np.meshgrid(*((np.arange(int(counts[k])) + 0.5) / counts[k] for k in (i, j))))
         within = a + b < 1 + 1e-9
         steps = a[within, None] * sides[0, group, None] + b[within, None] * sides[1, group, None]
         points.append((first[group, None] + steps).reshape(-1, 3))

@@ -91,6 +91,17 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
     assert np.abs(found / expected - 1).max() < 0.005
 
 
+def test_a_painted_albedo_is_recolored():
+    """What `detail` adds is the ratio to the median in ACEScg, as `LutSet.recolor` has it; gray stays gray."""
+    luts, rng = lutgen.load(), np.random.default_rng(1)
+    albedo = luts.color(0.01 + 0.02 * rng.random((16, 16)), 0.7, 0.004 + 0.02 * rng.random((16, 16)))
+    acescg = lutgen.color.from_xyz(albedo @ np.linalg.inv(lutgen.color.SRGB_FROM_XYZ).T, "acescg")
+    expected = acescg / np.median(acescg, axis=(0, 1))
+    assert app.detail(albedo) == pytest.approx(expected, rel=1e-9)
+    gray = app.detail(np.repeat(0.2 + 0.6 * rng.random((8, 8, 1)), 3, axis=-1))
+    assert np.ptp(gray, axis=-1).max() < 1e-9
+
+
 def test_thin_parts_let_light_through(plain):
     """Lit from behind, a thin sheet glows red and a thick one does not."""
     look = Look(environment=0, light=10, light_azimuth=180, light_elevation=0, azimuth=0, elevation=0, distance_mm=300)
