@@ -45,12 +45,15 @@ def look_of(options: Namespace) -> Look:
 
 
 def _stage(options: Namespace, size: str):
-    """The stage that the options describe, and what is to be said about its head."""
-    app = _viewer("app")
+    """The viewer's app, the stage that the options describe, and what is to be said about its head."""
+    app, passes = _viewer("app"), _viewer("passes")
     pixels = app.size_of(options.size or size)
     luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
+    around = app.surroundings_of(options.environment, options.normalize_environment)
     shape, given = app.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
-    return app, luts, shape, given, pixels
+    stage = app.open_stage(luts, shape, given, pixels)
+    passes.set_environment(stage, around)
+    return app, stage, [*shape.notes, *([shape.attribution] if shape.attribution not in ("built-in", "") else [])]
 
 
 def _write(pixels: np.ndarray, path: str) -> None:
@@ -67,19 +70,17 @@ def _write(pixels: np.ndarray, path: str) -> None:
 def view(options: Namespace) -> Outcome:
     """Draw one picture."""
     look = look_of(options)
-    app, luts, shape, given, size = _stage(options, PICTURE_SIZE)
-    said = [*shape.notes, *([shape.attribution] if shape.attribution != "built-in" else [])]
-    _write(app.picture(app.open_stage(luts, shape, given, size), look), options.screenshot)
-    text = "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *said])
-    return {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": said}, text, 0
+    app, stage, said = _stage(options, PICTURE_SIZE)
+    _write(app.picture(stage, look), options.screenshot)
+    text = "\n".join([f"{options.screenshot}: {stage.size[0]} x {stage.size[1]}", *said])
+    return {"screenshot": options.screenshot, "size": list(stage.size), "look": asdict(look), "notes": said}, text, 0
 
 
 def sheet(options: Namespace) -> Outcome:
     """Draw every preset beside the others."""
     look = look_of(options)
-    app, luts, shape, given, size = _stage(options, SHEET_SIZE)
-    pixels = app.sheet(app.open_stage(luts, shape, given, size), look)
+    app, stage, said = _stage(options, SHEET_SIZE)
+    pixels = app.sheet(stage, look)
     _write(pixels, options.out)
-    said = [*shape.notes, *([shape.attribution] if shape.attribution != "built-in" else [])]
     text = "\n".join([f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets", *said])
     return {"sheet": options.out, "presets": list(scene.PRESETS), "notes": said}, text, 0

@@ -21,10 +21,10 @@ LEVELS = [
     {"solvers"},
     {"painting"},
     {"placing"},
-    {"probing", "head", "maps"},
+    {"probing", "head", "maps", "environment"},
     {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
-    {"axes", "tissue", "color", "sculpt", "surroundings", "cache"},
+    {"axes", "tissue", "color", "sculpt", "surroundings", "cache", "hdr"},
     {"chromophores"},
     {"errors"},
 ]

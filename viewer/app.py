@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import color, head, maps, mesh, painting, scene
+from lutgen import color, environment, head, maps, mesh, painting, scene
 from lutgen.errors import InputError
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
-from . import passes
+from . import light, passes
 
 SIZE = (1280, 720)
 MAX_SIDE = 4096
@@ -63,6 +63,20 @@ def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
     acescg = np.maximum(color.from_xyz(albedo @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg"), 1e-4)
     painted = acescg.sum(axis=-1) > coverage * 3
     return np.clip(acescg / np.median(acescg[painted], axis=0), 0.05, 8)
+
+
+def surroundings_of(name: str, normalized: bool = False) -> np.ndarray | None:
+    """Light from all around by name: None for `studio`, black for `none`, else the radiance of an .exr or .hdr.
+
+    `normalized` scales a file so that its mean radiance is the studio's, for pictures of unknown exposure.
+    """
+    if name == "studio":
+        return None
+    if name == "none":
+        return np.zeros((1, 2, 3))
+    radiance = environment.read(Path(name))
+    mean = environment.mean_radiance(radiance)
+    return radiance * (light.studio_mean() / mean) if normalized and mean > 0 else radiance
 
 
 def textures_of(given: Maps) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
-from lutgen import color, scene
+from lutgen import color, environment, scene
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
 
@@ -43,8 +43,8 @@ class Stage:
     center_mm: np.ndarray
     radius_mm: float
     maps: dict
-    environment: np.ndarray
-    environment_map: moderngl.Texture
+    irradiance: np.ndarray
+    environment_map: moderngl.Texture | None
     ggx: moderngl.Texture
     targets: dict
     oxygenation: float
@@ -65,7 +65,6 @@ def open_stage(mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int,
     head = context.vertex_array(surface, [(buffer, "3f 3f 2f", "position", "normal", "uv")], indices)
     cast = context.vertex_array(shadow, [(buffer, "3f 20x", "position")], indices)
     center = (mesh.positions_mm.max(axis=0) + mesh.positions_mm.min(axis=0)) / 2
-    directions = light.fibonacci(4096)
     albedo = light.ggx_albedo().astype("f4")
     ggx = gl.texture((albedo.shape[1], albedo.shape[0]), 2, "f4", np.ascontiguousarray(albedo).tobytes())
     ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -74,7 +73,7 @@ def open_stage(mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int,
         gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
-        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx, {},
+        light.studio_irradiance(), None, ggx, {},
         luts.oxygenation,
     )  # fmt: skip
     resize(stage, size)
@@ -99,6 +98,17 @@ def set_map(stage: Stage, name: str, values: np.ndarray | None) -> None:
     """Exchange one of the head's maps."""
     stage.maps[name].release()
     stage.maps[name] = _map(values, _PLAIN[name])
+
+
+def set_environment(stage: Stage, radiance: np.ndarray | None) -> None:
+    """Exchange the light from all around: radiance [rows, 2 rows, 3] as of `environment.read`; None: the studio."""
+    if stage.environment_map is not None:
+        gl.free(stage.environment_map)
+    stage.environment_map, stage.irradiance = None, light.studio_irradiance()
+    if radiance is not None:
+        ways, angles = environment.directions(len(radiance))
+        stage.irradiance = light.irradiance_sh(ways.reshape(-1, 3), radiance.reshape(-1, 3), angles.ravel())
+        stage.environment_map = gl.levels(environment.blurred(radiance))
 
 
 def resize(stage: Stage, size: tuple[int, int]) -> None:
@@ -165,9 +175,10 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
     buffer.use()
     buffer.clear(0.0, 0.0, 0.0, 0.0)
     gl.context().enable_only(moderngl.DEPTH_TEST)
+    around = stage.environment_map
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
             surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], shadow_map=stage.targets["cast"],
-            environment_map=stage.environment_map, ggx_albedo=stage.ggx)  # fmt: skip
+            environment_map=stage.ggx if around is None else around, ggx_albedo=stage.ggx)  # fmt: skip
     grid = stage.luts.color_lut.grid
     axes = grid.melanin, grid.eumelanin, grid.hemoglobin
     fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
@@ -179,8 +190,9 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
         chromophores_low=tuple(a.low for a in axes), chromophores_high=tuple(a.high for a in axes),
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
-        environment_entry=light.entry_of_the_sky(), environment_levels=0, environment=look.environment,
-        irradiance_sh=stage.environment,
+        environment_entry=light.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
+        environment_levels=0 if around is None else environment.LEVELS,
+        environment_turn=tuple(f(np.radians(look.environment_azimuth)) for f in (np.cos, np.sin)),
     )  # fmt: skip
     stage.head.render()
 
@@ -243,7 +255,8 @@ def release(stage: Stage) -> None:
     tables = [t for t in (stage.uploaded, stage.burley) if t is not None]
     shared = {id(t): t for group in tables for t in (group.color, group.rings, group.encircled)}
     gl.free(
-        *stage.targets.values(), *stage.maps.values(), *shared.values(), stage.environment_map, stage.ggx, stage.head,
+        *stage.targets.values(), *stage.maps.values(), *shared.values(), stage.ggx, stage.head,
         stage.head_shadow, stage.surface, stage.shadow, *stage.buffers,
+        *([] if stage.environment_map is None else [stage.environment_map]),
         *(part for law in (stage.gather, stage.compose) for part in (law.array, law.program, law.corners)),
     )  # fmt: skip
