@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from argparse import Namespace
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -12,7 +12,7 @@ import numpy as np
 
 import lutgen
 from lutgen import manifest, scene
-from lutgen.errors import InputError, MachineError, cannot_write
+from lutgen.errors import InputError, MachineError, cannot_write, one_of
 from lutgen.scene import Look
 
 Outcome = tuple[dict, str, int]
@@ -49,8 +49,12 @@ def _stage(options: Namespace, size: str):
     app, passes = _viewer("app"), _viewer("passes")
     pixels = app.size_of(options.size or size)
     luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
+    one_of("albedo", options.albedo, app.ALBEDO)
     around = app.surroundings_of(options.environment, options.normalize_environment)
     shape, given = app.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
+    if options.albedo == "invert":
+        given, more = app.inverted(luts, given)
+        shape = replace(shape, notes=(*shape.notes, *more))
     stage = app.open_stage(luts, shape, given, pixels)
     passes.set_environment(stage, around)
     return app, stage, [*shape.notes, *([shape.attribution] if shape.attribution not in ("built-in", "") else [])]

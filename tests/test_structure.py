@@ -20,7 +20,7 @@ LEVELS = [
     {"baking"},
     {"solvers"},
     {"painting"},
-    {"placing"},
+    {"placing", "inversion"},
     {"probing", "head", "maps", "environment"},
     {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import color, environment, head, maps, mesh, painting, scene
+from lutgen import color, environment, head, inversion, maps, mesh, painting, scene
 from lutgen.errors import InputError
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
@@ -19,6 +19,8 @@ from . import light, passes
 
 SIZE = (1280, 720)
 MAX_SIDE = 4096
+ALBEDO = ("recolor", "invert")
+"""What is made of a painted albedo: its detail laid over any skin, or maps of pigment and blood."""
 
 
 def size_of(text: str) -> tuple[int, int]:
@@ -63,6 +65,31 @@ def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
     acescg = np.maximum(color.from_xyz(albedo @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg"), 1e-4)
     painted = acescg.sum(axis=-1) > coverage * 3
     return np.clip(acescg / np.median(acescg[painted], axis=0), 0.05, 8)
+
+
+def inverted(luts: LutSet, given: Maps) -> tuple[Maps, tuple[str, ...]]:
+    """Maps whose albedo is taken apart into pigment and blood instead of being laid over the skin; and what was found.
+
+    Chromophore maps that were given stay.
+    """
+    if given.albedo is None:
+        return given, ("no albedo to invert: neither the mesh nor the maps bring one",)
+    found = inversion.invert(luts, _shrunk(given.albedo, 2048))
+    layers = inversion.ratios(found)
+    if given.chromophores is not None:
+        kept = np.any(given.chromophores != 1, axis=(0, 1))
+        rows, columns = layers.shape[:2]
+        layers = np.stack(
+            [maps.resized(given.chromophores[..., k], rows, columns) if kept[k] else layers[..., k] for k in range(3)],
+            axis=-1,
+        )
+    skin, gain = found.skin, " ".join(f"{v:.2f}" for v in found.gain)
+    left = float(np.median(found.residual[found.painted]))
+    note = (
+        f"albedo inverted: median melanin {skin[0]:.3g}, eumelanin {skin[1]:.2g}, hemoglobin {skin[2]:.3g}; "
+        f"balanced by {gain}; median color difference left {left:.1f}"
+    )
+    return replace(given, chromophores=layers, albedo=None), (note,)
 
 
 def surroundings_of(name: str, normalized: bool = False) -> np.ndarray | None:
