@@ -27,6 +27,8 @@ _HOLD = 2.0
 """Color difference that leaving the low frequencies by a whole axis counts as."""
 _STEPS, _DAMPING, _CHUNK, _COARSE = 8, 1e-3, 1 << 16, 16
 _UNPAINTED = 1e-3
+_CELLS = 32
+"""Cells along each side of what is called low frequencies; with fewer, patches of baked light show on dark skin."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +83,10 @@ def invert(luts: LutSet, albedo, eumelanin: float | None = None, balance: bool =
         fits.append((moved + float(np.median(left)), float(e), gain))
     _, e, gain = min(fits, key=lambda fit: fit[0])
     table = _slice(luts, e)
-    held, _ = _solved(table, _lab(_low(albedo * gain, painted).reshape(-1, 3)))
-    rows, columns = _low_shape(painted)
+    low = _low(albedo * gain, painted)
+    held = _solved(table, _lab(low.reshape(-1, 3)))[0].reshape(*low.shape[:2], 2)
     size = painted.shape
-    hold = np.stack([maps.resized(held[:, k].reshape(rows, columns), *size)[painted] for k in (0, 1)], axis=1)
+    hold = np.stack([maps.resized(held[..., k], *size)[painted] for k in (0, 1)], axis=1)
     at, left = _solved(table, _lab(albedo[painted] * gain), hold)
     middle = np.median(at, axis=0)
     found = [np.full(size, value) for value in (*middle, 0.0)]
@@ -215,13 +217,9 @@ def _refined(table, wanted, at, hold) -> tuple[np.ndarray, np.ndarray]:
     return at, np.linalg.norm(left, axis=1)
 
 
-def _low_shape(painted: np.ndarray) -> tuple[int, int]:
-    return min(painted.shape[0], 32), min(painted.shape[1], 32)
-
-
 def _low(values: np.ndarray, painted: np.ndarray) -> np.ndarray:
-    """Low frequencies [32, 32, channels] of a picture [R, C, channels]: means of what is painted, else of all of it."""
-    rows, columns = _low_shape(painted)
+    """Low frequencies [32, 32, channels] of a picture [R, C, channels]: means of what is painted, else of all."""
+    rows, columns = (min(n, _CELLS) for n in painted.shape)
     down, across = (np.arange(n) * k // n for n, k in zip(painted.shape, (rows, columns), strict=True))
     cell = (down[:, None] * columns + across)[painted]
     count = np.bincount(cell, minlength=rows * columns)

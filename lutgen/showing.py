@@ -44,7 +44,7 @@ def look_of(options: Namespace) -> Look:
     return scene.changed(look, values)
 
 
-def _stage(options: Namespace, size: str):
+def _stage(options: Namespace, look: Look, size: str):
     """The viewer's app, the stage that the options describe, and what is to be said about its head."""
     app, passes = _viewer("app"), _viewer("passes")
     pixels = app.size_of(options.size or size)
@@ -53,7 +53,7 @@ def _stage(options: Namespace, size: str):
     around = app.surroundings_of(options.environment, options.normalize_environment)
     shape, given = app.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
     if options.albedo == "invert":
-        given, more = app.inverted(luts, given)
+        given, more = app.inverted(luts, given, look.eumelanin)
         shape = replace(shape, notes=(*shape.notes, *more))
     stage = app.open_stage(luts, shape, given, pixels)
     passes.set_environment(stage, around)
@@ -74,7 +74,7 @@ def _write(pixels: np.ndarray, path: str) -> None:
 def view(options: Namespace) -> Outcome:
     """Draw one picture."""
     look = look_of(options)
-    app, stage, said = _stage(options, PICTURE_SIZE)
+    app, stage, said = _stage(options, look, PICTURE_SIZE)
     _write(app.picture(stage, look), options.screenshot)
     text = "\n".join([f"{options.screenshot}: {stage.size[0]} x {stage.size[1]}", *said])
     return {"screenshot": options.screenshot, "size": list(stage.size), "look": asdict(look), "notes": said}, text, 0
@@ -83,7 +83,7 @@ def view(options: Namespace) -> Outcome:
 def sheet(options: Namespace) -> Outcome:
     """Draw every preset beside the others."""
     look = look_of(options)
-    app, stage, said = _stage(options, SHEET_SIZE)
+    app, stage, said = _stage(options, look, SHEET_SIZE)
     pixels = app.sheet(stage, look)
     _write(pixels, options.out)
     text = "\n".join([f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets", *said])

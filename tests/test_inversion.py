@@ -129,11 +129,11 @@ def test_a_head_takes_inverted_maps_and_keeps_given_ones(luts):
     albedo = luts.color(m, 0.7, 0.01)
     given = np.ones((4, 4, 3))
     given[..., 2] = 2.5
-    made, notes = app.inverted(luts, Maps(chromophores=given, albedo=albedo))
+    made, notes = app.inverted(luts, Maps(chromophores=given, albedo=albedo), 0.7)
     assert made.albedo is None
     assert np.all(made.chromophores[..., 2] == 2.5)
     assert np.corrcoef(np.log(made.chromophores[..., 0]).ravel(), np.log(m).ravel())[0, 1] > 0.6
     assert "albedo inverted: median melanin 0.04" in notes[0]
-    kept, notes = app.inverted(luts, Maps())
+    kept, notes = app.inverted(luts, Maps(), 0.7)
     assert kept == Maps()
     assert "no albedo to invert" in notes[0]

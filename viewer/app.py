@@ -67,14 +67,14 @@ def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
     return np.clip(acescg / np.median(acescg[painted], axis=0), 0.05, 8)
 
 
-def inverted(luts: LutSet, given: Maps) -> tuple[Maps, tuple[str, ...]]:
+def inverted(luts: LutSet, given: Maps, eumelanin: float) -> tuple[Maps, tuple[str, ...]]:
     """Maps whose albedo is taken apart into pigment and blood instead of being laid over the skin; and what was found.
 
-    Chromophore maps that were given stay.
+    `eumelanin` is the look's, for ratios found with one pigment tint another. Chromophore maps that were given stay.
     """
     if given.albedo is None:
         return given, ("no albedo to invert: neither the mesh nor the maps bring one",)
-    found = inversion.invert(luts, _shrunk(given.albedo, 2048))
+    found = inversion.invert(luts, _shrunk(given.albedo, 2048), eumelanin)
     layers = inversion.ratios(found)
     if given.chromophores is not None:
         kept = np.any(given.chromophores != 1, axis=(0, 1))
