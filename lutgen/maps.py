@@ -8,6 +8,7 @@ Row 0 of every array here is the bottom of the picture, where v is 0.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,40 +53,52 @@ def decode_ratio(texel: np.ndarray) -> np.ndarray:
 
 
 def read(path: Path) -> tuple[np.ndarray, bool]:
-    """A picture [rows, columns, 1 or 3 channels], first row lowest, and whether it holds values (EXR) or texels 0 to 1.
+    """A picture [rows, columns, 1 or 3 channels], first row lowest, and whether it holds values or texels 0 to 1.
 
-    8- and 16-bit pictures, gray, palette or color, with alpha or without, of any size; InputError for anything else.
+    EXR and 32-bit float TIFF hold values; 8- and 16-bit pictures texels: gray, palette or color, with alpha or without,
+    of any size. InputError for anything else, and for NaN.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"map {path}: there is no such file")
-    if path.suffix.lower() == ".exr":
-        from lutgen import exr
-
-        channels = next(iter(exr.read(path).values())).channels
-        names = [n for n in "RGB" if n in channels] or list(channels)[:1]
-        values, given = np.stack([channels[n].astype(float) for n in names], axis=-1), True
-    else:
-        values, given = _picture(path), False
-    if values.shape[-1] == 2:
-        values = values[..., :1]
+    values, given = (_exr(path), True) if path.suffix.lower() == ".exr" else _picture(path)
     if not np.all(np.isfinite(values)):
         raise InputError(f"map {path}: holds NaN or infinite values; mend it")
     return values[::-1], given
 
 
-def _picture(path: Path) -> np.ndarray:
+def _exr(path: Path) -> np.ndarray:
+    from lutgen import exr
+
+    try:
+        channels = next(iter(exr.read(path).values())).channels
+        names = [n for n in "RGB" if n in channels] if set("RGB") <= set(channels) else sorted(channels)[-1:]
+        return np.stack([channels[n].astype(float) for n in names], axis=-1)
+    except ValueError as error:  # InputError too, which speaks of LUT sets
+        raise InputError(f"map {path}: not a whole OpenEXR file, or its channels differ in size") from error
+
+
+def _picture(path: Path) -> tuple[np.ndarray, bool]:
     from PIL import Image
 
     try:
-        with Image.open(path) as image:
-            image.load()
-            if image.mode.startswith("I;16") or image.mode == "I":
-                return np.asarray(image, float)[..., None] / 65535
-            if image.mode in ("1", "L", "LA"):
-                return np.asarray(image.convert("L"), float)[..., None] / 255
-            return np.asarray(image.convert("RGB"), float) / 255
-    except (OSError, ValueError, SyntaxError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # 16k maps are no bombs
+            with Image.open(path) as image:
+                image.load()
+        if image.mode == "F":
+            return np.asarray(image, float)[..., None], True
+        if image.mode.startswith("I"):
+            values = np.asarray(image, float)[..., None]
+            if values.max() > 65535 or values.min() < 0:
+                raise InputError(f"map {path}: holds integers of 32 bits; save it with 8 or 16, or as EXR")
+            return values / 65535, False
+        if image.mode in ("1", "L", "LA"):
+            return np.asarray(image.convert("L"), float)[..., None] / 255, False
+        return np.asarray(image.convert("RGB"), float) / 255, False
+    except InputError:
+        raise
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise InputError(f"map {path}: not a picture that can be read ({error})") from error
 
 
@@ -107,6 +120,9 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
     if not found:
         raise InputError(f"maps = {folder}: holds none of {', '.join(NAMES)} (as {', '.join(SUFFIXES)})")
     values = {name: _decoded(name, *read(path)) for name, path in found.items()}
+    for name in values.keys() - {"normal", "albedo"}:
+        if values[name].min() < 0:
+            raise InputError(f"map {found[name]}: holds negative values, down to {values[name].min():g}; mend it")
     below = under or Maps()
     return Maps(
         _together(values, RATIOS, None if "albedo" in values else below.chromophores),
@@ -124,7 +140,7 @@ def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:
         return values
     values = values.mean(axis=-1)
     if given:
-        return np.clip(values / THICKNESS_MM, 0, 1) if name == "thickness" else values
+        return np.minimum(values / THICKNESS_MM, 1) if name == "thickness" else values
     return decode_ratio(values) if name in RATIOS else values * (SURFACE_RANGE if name in SURFACE[:2] else 1.0)
 
 

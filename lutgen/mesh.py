@@ -89,17 +89,25 @@ def load(path: Path, mm_per_unit: float | None = None, flip_v: bool = False) -> 
     if mm_per_unit is None:
         mm_per_unit, note = _guess(high - low)
         notes.append(note)
-    uv = getattr(whole.visual, "uv", None)
-    if uv is None or len(uv) != len(positions) or not np.all(np.isfinite(uv)):
-        uv = None
-        notes.append(f"{path.name} has no texture coordinates: maps, pores and freckles are not shown")
-    else:
-        uv = np.asarray(uv, "f4").copy()
-        uv[:, 1] = 1 - uv[:, 1] if flip_v else uv[:, 1]
+    uv, lack = _coordinates(whole)
+    if uv is None:
+        notes.append(f"{path.name} {lack}: maps, pores, freckles, occlusion and thickness are left out; unwrap it")
+    elif flip_v:
+        uv[:, 1] = 1 - uv[:, 1]
     positions = (positions - (low + high) / 2) * mm_per_unit
     return Mesh(
         positions.astype("f4"), normals(positions, triangles), uv, triangles, _pictures(whole), tuple(notes)
     )  # fmt: skip
+
+
+def _coordinates(whole) -> tuple[np.ndarray | None, str]:
+    """Texture coordinates [V, 2], or None and what is wrong with them."""
+    uv = getattr(whole.visual, "uv", None)
+    if uv is None or len(uv) != len(whole.vertices):
+        return None, "has no texture coordinates"
+    if not np.all(np.isfinite(uv)):
+        return None, "has texture coordinates that are NaN"
+    return np.asarray(uv, "f4").copy(), ""
 
 
 def _read(path: Path):

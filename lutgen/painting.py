@@ -28,6 +28,9 @@ def paint(shape: Mesh) -> dict[str, np.ndarray]:
 
 def notes(shape: Mesh) -> tuple[str, ...]:
     """What could not be painted on a head, for its user."""
+    lack = "" if shape.uv is None else _lack(shape)
+    if lack:
+        return (f"texture coordinates {lack}: pores, freckles, occlusion and thickness are left out; unwrap the mesh",)
     made = _painted(shape)
     if "face" in made and not made["face"]:
         return (
@@ -37,11 +40,21 @@ def notes(shape: Mesh) -> tuple[str, ...]:
 
 
 def _painted(shape: Mesh) -> dict[str, np.ndarray]:
-    if shape.uv is None:
+    if shape.uv is None or _lack(shape):
         return {}
     own = shape.attribution == "built-in"
     parts = shape.positions_mm, shape.normals, shape.uv, shape.triangles
     return cache.kept("maps", _MODULES, lambda: _paint(shape, own), *parts, np.array(own))
+
+
+def _lack(shape: Mesh) -> str:
+    """Why a head's texture coordinates cannot be painted by: palettes collapse them, tiles repeat them."""
+    assert shape.uv is not None
+    extent = np.ptp(shape.uv[shape.triangles].astype("f8"), axis=1)
+    covered = float(extent.prod(axis=1).sum()) / 2
+    if not covered > 1e-6:
+        return "have no area"
+    return f"cover the texture {covered:.0f} times" if covered > 32 or extent.max() > 4 else ""
 
 
 def _paint(shape: Mesh, own: bool) -> dict[str, np.ndarray]:
@@ -70,9 +83,9 @@ def _in_texture(shape: Mesh, values: np.ndarray, size: int) -> np.ndarray:
     wraps = corners.max(axis=1) > size * (1 + 1e-6)
     extent = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
     out = np.full((size, size, values.shape[1]), np.nan, "f4")
-    for low, high in ((0, 4), (4, 8), (8, 16), (16, 40), (40, 160), (160, 1e9)):
+    for low, high in ((0, 4), (4, 8), (8, 16), (16, 40), (40, 160), (160, 640), (640, 1e9)):
         group = np.flatnonzero((extent >= low) & (extent < high))
-        steps = int(2 * min(high, 1000)) + 1
+        steps = int(2 * min(high, 4 * size)) + 1
         w = np.array([(i, j) for i in range(steps + 1) for j in range(steps + 1 - i)]) / steps
         w = np.concatenate([w, 1 - w.sum(axis=1, keepdims=True)], axis=1)
         for part in np.array_split(group, max(1, len(group) * len(w) // 2_000_000)):

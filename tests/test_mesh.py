@@ -95,6 +95,16 @@ def test_what_is_no_mesh_is_one_line(tmp_path):
         mesh.load(tmp_path / "head.glb", mm_per_unit=0.0)
 
 
+def test_texture_coordinates_that_are_nan_are_said_and_left(tmp_path):
+    made = ball(1.0, uv=False)
+    lines = [f"v {x} {y} {z}\nvt nan nan" for x, y, z in made.vertices]
+    lines += ["f " + " ".join(f"{k + 1}/{k + 1}" for k in face) for face in made.faces]
+    (tmp_path / "head.obj").write_text("\n".join(lines))
+    found = mesh.load(tmp_path / "head.obj", 1.0)
+    assert found.uv is None
+    assert "has texture coordinates that are NaN: maps, pores" in found.notes[0]
+
+
 def test_v_can_be_turned_over(tmp_path):
     ball(1.0).export(tmp_path / "head.glb")
     one, two = (mesh.load(tmp_path / "head.glb", 1.0, flip_v=flip) for flip in (False, True))

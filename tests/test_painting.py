@@ -92,6 +92,15 @@ def test_what_has_no_face_is_mottled_and_said_so(tmp_path, monkeypatch):
     assert painting.notes(replace(shape, uv=None)) == ()
 
 
+@pytest.mark.parametrize(("scale", "lack"), [(0.0, "have no area"), (90.0, "cover the texture")])
+def test_texture_coordinates_that_cannot_be_painted_by_are_said(scale, lack):
+    shape = head.builtin()
+    assert shape.uv is not None
+    other = replace(shape, uv=scale * shape.uv, attribution="")
+    assert painting.paint(other) == {}
+    assert lack in painting.notes(other)[0]
+
+
 def test_texture_coordinates_beyond_the_texture_wrap_around():
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "f4")
     triangles = np.array([[0, 1, 2], [0, 2, 3]], "i4")

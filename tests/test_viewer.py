@@ -100,6 +100,8 @@ def test_a_painted_albedo_is_recolored():
     assert app.detail(albedo) == pytest.approx(expected, rel=1e-9)
     gray = app.detail(np.repeat(0.2 + 0.6 * rng.random((8, 8, 1)), 3, axis=-1))
     assert np.ptp(gray, axis=-1).max() < 1e-9
+    with pytest.raises(lutgen.InputError, match="albedo is black throughout"):
+        app.detail(np.zeros((4, 4, 3)))
 
 
 def test_thin_parts_let_light_through(plain):
@@ -189,6 +191,9 @@ def test_screenshot_and_sheet_commands(tmp_path, capsys):
         (["--size", "wide"], 2, "for example 640x360"),
         (["--look", "none.toml"], 2, "look none.toml: cannot be read"),
         (["nowhere"], 2, "nowhere"),
+        (["--environment", "beach"], 2, "environment = beach: allowed is studio, none or a file ending in"),
+        (["--albedo", "paint"], 2, "albedo = 'paint': allowed is recolor, invert"),
+        (["--set", "environment_azimuth=200"], 2, "environment_azimuth = 200: allowed is -180 to 180"),
     ],
 )
 def test_bad_input_is_one_line(arguments, status, message, tmp_path, capsys, monkeypatch):
@@ -198,6 +203,19 @@ def test_bad_input_is_one_line(arguments, status, message, tmp_path, capsys, mon
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out.png").exists()
+
+
+def test_a_head_without_texture_coordinates_is_drawn_and_said(tmp_path, capsys):
+    import trimesh
+
+    trimesh.creation.icosphere(2, 120).export(tmp_path / "ball.glb")
+    out = tmp_path / "out.png"
+    assert main(["view", "--screenshot", str(out), "--size", "64x48", "--mesh", str(tmp_path / "ball.glb"),
+                 "--albedo", "invert"]) == 0  # fmt: skip
+    said = capsys.readouterr().out
+    assert "ball.glb has no texture coordinates: maps, pores, freckles" in said
+    assert "no albedo to invert" in said
+    assert out.exists()
 
 
 def test_without_opengl_the_line_says_what_to_install(monkeypatch):

@@ -64,6 +64,8 @@ def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
     """
     acescg = np.maximum(color.from_xyz(albedo @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg"), 1e-4)
     painted = acescg.sum(axis=-1) > coverage * 3
+    if not painted.any():
+        raise InputError("albedo is black throughout: there is no skin on it")
     return np.clip(acescg / np.median(acescg[painted], axis=0), 0.05, 8)
 
 
