@@ -205,6 +205,32 @@ def test_bad_input_is_one_line(arguments, status, message, tmp_path, capsys, mon
     assert not (tmp_path / "out.png").exists()
 
 
+def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_path, monkeypatch):
+    pixel = np.full((1, 1, 3), 9, "u1")
+    square = Mesh(np.eye(4, 3, dtype="f4"), np.eye(4, 3, dtype="f4"), np.eye(4, 2, dtype="f4"), np.array([[0, 1, 2]]))
+    painted = {"chromophores": np.full((2, 2, 3), 2.0), "surface": np.full((2, 2, 4), 0.5), "normal": pixel}
+    monkeypatch.setattr(painting, "paint", lambda shape: dict(painted))
+    monkeypatch.setattr(painting, "notes", lambda shape: ("painted",))
+    textures_given = {}
+    monkeypatch.setattr(app.mesh, "of", lambda *given: replace(square, textures=textures_given, notes=(str(given),)))
+    shape, found = app.model("a.glb", 2.0, None, True)
+    assert shape.notes == ("('a.glb', 2.0, True)", "painted")
+    assert found.albedo is None
+    assert found.chromophores[0, 0, 0] == 2
+    textures_given |= {"albedo": np.full((1, 1, 3), 188, "u1"), "normal": pixel + 1}
+    _, found = app.model("a.glb", None, None)
+    assert found.chromophores is None  # it is in the albedo already
+    assert found.albedo[0, 0, 0] == pytest.approx(0.503, abs=1e-3)
+    assert found.normal[0, 0, 0] == 10
+    assert np.all(found.surface == 0.5)
+    Image.fromarray(np.full((1, 1), 255, "u1")).save(tmp_path / "occlusion.png")
+    Image.new("RGB", (1, 1), (128, 128, 255)).save(tmp_path / "normal.png")
+    _, found = app.model("a.glb", None, str(tmp_path))
+    assert found.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
+    assert found.normal[0, 0, 2] == 1
+    assert found.albedo is not None
+
+
 def test_a_head_without_texture_coordinates_is_drawn_and_said(tmp_path, capsys):
     import trimesh
 
