@@ -26,12 +26,14 @@ SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
 @dataclass(frozen=True)
 class Maps:
     """Textures for the viewer: `chromophores` ratios [.., .., 3], `surface` [.., .., 4] (roughness and specular ratio,
-    occlusion, thickness / 32 mm), `normal` [.., .., 3] in 0 to 1, `albedo` linear sRGB [.., .., 3]; None: not given."""
+    occlusion, thickness / 32 mm), `normal` [.., .., 3] in 0 to 1, `albedo` linear sRGB [.., .., 3]; None: not given.
+    `full_contrast_melanin`: the skin's up to which chromophore ratios hold as they are; on darker skin they fade."""
 
     chromophores: np.ndarray | None = None
     surface: np.ndarray | None = None
     normal: np.ndarray | None = None
     albedo: np.ndarray | None = None
+    full_contrast_melanin: float = 0.0292
 
 
 def encode_ratio(ratio: np.ndarray) -> np.ndarray:
@@ -129,6 +131,7 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
         _together(values, SURFACE, below.surface),
         _color(values["normal"]) if "normal" in values else below.normal,
         _color(values["albedo"]) if "albedo" in values else below.albedo,
+        below.full_contrast_melanin,
     )  # fmt: skip
 
 

@@ -7,6 +7,8 @@ on the back of a head: mottled, without lips and freckles.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from lutgen import cache, complexion, placing, surroundings
@@ -17,7 +19,7 @@ _MODULES = ("painting", "placing", "surroundings", "complexion", "sculpt", "head
 _NO_FACE_MM = np.array([0.0, 1000.0, -1000.0])
 
 
-def paint(shape: Mesh) -> dict[str, np.ndarray]:
+def paint(shape: Mesh) -> dict[str, Any]:
     """A head's maps [1024, 1024, channels], first row lowest: `chromophores`, `surface`, `normal`.
 
     As `lutgen.maps.Maps` holds them; kept in the cache. Without texture coordinates none are made.

@@ -134,6 +134,7 @@ def test_a_head_takes_inverted_maps_and_keeps_given_ones(luts):
     assert np.all(made.chromophores[..., 2] == 2.5)
     assert np.corrcoef(np.log(made.chromophores[..., 0]).ravel(), np.log(m).ravel())[0, 1] > 0.6
     assert "albedo inverted: median melanin 0.04" in notes[0]
+    assert made.full_contrast_melanin == pytest.approx(np.median(m), rel=0.02)
     kept, notes = app.inverted(luts, Maps(), 0.7)
     assert kept == Maps()
     assert "no albedo to invert" in notes[0]

@@ -128,6 +128,21 @@ def test_maps_change_the_skin_where_they_are(plain):
     assert np.array_equal(again, base)
 
 
+def test_maps_fade_on_skin_darker_than_they_were_painted_for(plain):
+    """By the power .38 of how much darker: a ratio of 4 at half of full contrast's melanin is 4^(2^-.38)."""
+    look = Look(melanin=0.04, azimuth=0, elevation=0, distance_mm=300, tier="off", transmission=0)
+    passes.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
+    made = {}
+    for full in (0.04, 0.02):
+        plain.full_contrast_melanin = full
+        linear(plain, look)
+        made[full] = gl.read(plain.targets["surface_buffer"], attachment=2)[160, 160, 0]
+    plain.full_contrast_melanin = 0.0292
+    passes.set_map(plain, "chromophores", None)
+    assert made[0.04] == pytest.approx(0.16, rel=2e-3)
+    assert made[0.02] == pytest.approx(0.04 * 4 ** (0.5**0.38), rel=2e-3)
+
+
 def test_oxygenation_reaches_the_textures_in_time(stage):
     """50 ms from slider to texture are promised; the expansion and the upload are timed by `lutgen bench --viewer`."""
     passes.set_oxygenation(stage, 0.2)

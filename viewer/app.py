@@ -91,7 +91,7 @@ def inverted(luts: LutSet, given: Maps, eumelanin: float) -> tuple[Maps, tuple[s
         f"albedo inverted: median melanin {skin[0]:.3g}, eumelanin {skin[1]:.2g}, hemoglobin {skin[2]:.3g}; "
         f"balanced by {gain}; median color difference left {left:.1f}"
     )
-    return replace(given, chromophores=layers, albedo=None), (note,)
+    return replace(given, chromophores=layers, albedo=None, full_contrast_melanin=skin[0]), (note,)
 
 
 def surroundings_of(name: str, normalized: bool = False) -> np.ndarray | None:
@@ -123,7 +123,9 @@ def _shrunk(values: np.ndarray, most: int = 4096) -> np.ndarray:
 
 def open_stage(luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int]) -> passes.Stage:
     """The stage of a head, its maps and a LUT set."""
-    return passes.open_stage(shape, textures_of(given), luts, size)
+    stage = passes.open_stage(shape, textures_of(given), luts, size)
+    stage.full_contrast_melanin = given.full_contrast_melanin
+    return stage
 
 
 def picture(stage: passes.Stage, look: Look) -> np.ndarray:

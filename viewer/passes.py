@@ -48,6 +48,7 @@ class Stage:
     ggx: moderngl.Texture
     targets: dict
     oxygenation: float
+    full_contrast_melanin: float = 0.0292
     seconds: dict = field(default_factory=dict)
 
 
@@ -181,7 +182,7 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
             environment_map=stage.ggx if around is None else around, ggx_albedo=stage.ggx)  # fmt: skip
     grid = stage.luts.color_lut.grid
     axes = grid.melanin, grid.eumelanin, grid.hemoglobin
-    fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
+    fade = min(stage.full_contrast_melanin / look.melanin, 1.0)  # freckles and blotches show less on darker skin
     gl.put(
         program, view=camera.view, projection=camera.projection, light_clip=_light_clip(stage, look),
         shadow_offset_mm=0.6,
