@@ -128,10 +128,11 @@ def porous(p: np.ndarray, lip: np.ndarray) -> np.ndarray:
     return np.clip(much * (1 - 0.6 * _spot(p, (31, -3, 74), 11)) * (1 - 0.75 * lip), 0, 1)
 
 
-def bumps(p: np.ndarray, lip: np.ndarray) -> np.ndarray:
+def bumps(p: np.ndarray, lip: np.ndarray, skin_mm: np.ndarray) -> np.ndarray:
     """Tangent normals and the pores' depth, 8 bit [rows, columns, 4], of bumps in the texture's own texels.
 
-    Creases, the lips' furrows and unevenness of a millimetre and more: what is finer is the pores' tile.
+    Creases, the lips' furrows and unevenness of a millimetre and more: what is finer is the pores' tile. `skin_mm`
+    [..., 3] is where the texels lie on the head itself, `p` on the built-in head.
     """
     height = 0.10 * _mottled(p / 5, 2, 71) + 0.035 * _mottled(p / 1.6, 2, 73) + _wrinkles(p)
     bent = p + 1.2 * np.stack([_mottled(p / 4, 2, seed) for seed in (81, 82, 83)], axis=-1)
@@ -139,7 +140,7 @@ def bumps(p: np.ndarray, lip: np.ndarray) -> np.ndarray:
         _noise(bent * [1.3, 0.2, 0.2], 86) - 0.5
     )
     height = height * (1 - lip) + lip * (0.42 * np.minimum(furrows, 0.3) + 0.06 * _mottled(p / 1.2, 2, 87))
-    texel = [np.linalg.norm(np.gradient(p, axis=k), axis=-1) for k in (1, 0)]
+    texel = [np.linalg.norm(np.gradient(skin_mm, axis=k), axis=-1) for k in (1, 0)]
     slope = [np.gradient(height, axis=k) / np.clip(t, 0.1, 2.0) for k, t in zip((1, 0), texel, strict=True)]
     n = np.stack([-slope[0], -slope[1], np.ones_like(height)], axis=-1)
     n /= np.linalg.norm(n, axis=-1, keepdims=True)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import importlib
 from argparse import Namespace
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
 import lutgen
 from lutgen import manifest, scene
-from lutgen.errors import InputError, MachineError
-from lutgen.lutset import LutSet
-from lutgen.maps import Maps
-from lutgen.mesh import Mesh
+from lutgen.errors import InputError, MachineError, one_of
 from lutgen.scene import Look
 
 Outcome = tuple[dict, str, int]
@@ -45,46 +44,40 @@ def look_of(options: Namespace) -> Look:
     return scene.changed(look, values)
 
 
-@dataclass(frozen=True)
-class Scene:
-    """What the options describe: LUT sets, a head, its maps, and what is to be said about it."""
-
-    luts: LutSet
-    other: LutSet | None
-    shape: Mesh
-    given: Maps
-    said: tuple[str, ...]
-
-
-def _scene(options: Namespace, app: ModuleType) -> Scene:
+def _opener(options: Namespace, app: ModuleType, look: Look) -> tuple[Callable, tuple[str, ...]]:
+    """What opens the stage that the options describe at a size in pixels, and what is to be said about its head."""
     luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
     other = None if options.compare is None else manifest.load(Path(options.compare))
-    shape, given = app.model(options.mesh, options.mm_per_unit, options.maps)
+    one_of("albedo", options.albedo, app.ALBEDO)
+    around = app.surroundings_of(options.environment, options.normalize_environment)
+    shape, given = app.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
+    more = ()
+    if options.albedo == "invert":
+        given, more = app.inverted(luts, given, look.eumelanin)
     credit = () if shape.attribution in ("", "built-in") else (shape.attribution,)
-    return Scene(luts, other, shape, given, (*shape.notes, *credit))
+    return partial(app.open_stage, luts, shape, given, other=other, around=around), (*shape.notes, *more, *credit)
 
 
 def view(options: Namespace) -> Outcome:
     """Open a window, or draw one picture."""
     look, app = look_of(options), _viewer("app")
     size = app.size_of(options.size or PICTURE_SIZE)
-    one = _scene(options, app)
+    opened, notes = _opener(options, app, look)
     if options.screenshot is None:
-        look = _viewer("window").run(one.luts, one.shape, one.given, look, size, one.other, one.said)
-        said = {"look": asdict(look), "notes": list(one.said)}
-        return said, "\n".join(one.said) or "closed", 0
-    app.write(app.picture(app.open_stage(one.luts, one.shape, one.given, size, one.other), look), options.screenshot)
-    said = {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": list(one.said)}
-    return said, "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *one.said]), 0
+        look = _viewer("window").run(opened, look, size, notes)
+        return {"look": asdict(look), "notes": list(notes)}, "\n".join(notes) or "closed", 0
+    app.write(app.picture(opened(size), look), options.screenshot)
+    said = {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": list(notes)}
+    return said, "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *notes]), 0
 
 
 def sheet(options: Namespace) -> Outcome:
     """Draw every preset beside the others."""
     look, app = look_of(options), _viewer("app")
     size = app.size_of(options.size or SHEET_SIZE)
-    one = _scene(options, app)
-    pixels = app.sheet(app.open_stage(one.luts, one.shape, one.given, size, one.other), look)
+    opened, notes = _opener(options, app, look)
+    pixels = app.sheet(opened(size), look)
     app.write(pixels, options.out)
-    said = {"sheet": options.out, "presets": list(scene.PRESETS), "notes": list(one.said)}
+    said = {"sheet": options.out, "presets": list(scene.PRESETS), "notes": list(notes)}
     shown = f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets"
-    return said, "\n".join([shown, *one.said]), 0
+    return said, "\n".join([shown, *notes]), 0

@@ -135,23 +135,3 @@ def test_no_seam_shows(shape):
     for k in np.unique(place.ravel()[doubled]):
         pair = values[place.ravel()[doubled] == k]
         assert np.abs(pair[0] - pair[1]).max() < 0.2
-
-
-def test_the_cache_is_used_mended_and_not_needed(shape, tmp_path, monkeypatch):
-    monkeypatch.setenv("LUTGEN_CACHE", str(tmp_path / "cache"))
-    calls = []
-
-    def made() -> dict:
-        calls.append(1)
-        return {"a": np.arange(3)}
-
-    for _ in range(2):
-        assert head.cached("thing", made)["a"].tolist() == [0, 1, 2]
-    assert len(calls) == 1
-    (path,) = (tmp_path / "cache").iterdir()
-    path.write_bytes(b"damaged")
-    assert head.cached("thing", made)["a"].tolist() == [0, 1, 2]
-    assert len(calls) == 2
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("LUTGEN_CACHE", str(tmp_path / "file" / "below"))
-    assert head.cached("thing", made)["a"].tolist() == [0, 1, 2]

@@ -20,10 +20,11 @@ LEVELS = [
     {"baking"},
     {"solvers"},
     {"painting"},
-    {"probing", "head", "maps"},
+    {"placing", "inversion"},
+    {"probing", "head", "maps", "environment"},
     {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
-    {"axes", "tissue", "color", "sculpt", "hair", "pores"},
+    {"axes", "tissue", "color", "sculpt", "hair", "pores", "surroundings", "cache", "hdr"},
     {"chromophores"},
     {"errors"},
 ]

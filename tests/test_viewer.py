@@ -93,6 +93,19 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
     assert np.abs(found / expected - 1).max() < 0.005
 
 
+def test_a_painted_albedo_is_recolored():
+    """What `detail` adds is the ratio to the median in ACEScg, as `LutSet.recolor` has it; gray stays gray."""
+    luts, rng = lutgen.load(), np.random.default_rng(1)
+    albedo = luts.color(0.01 + 0.02 * rng.random((16, 16)), 0.7, 0.004 + 0.02 * rng.random((16, 16)))
+    acescg = lutgen.color.from_xyz(albedo @ np.linalg.inv(lutgen.color.SRGB_FROM_XYZ).T, "acescg")
+    expected = acescg / np.median(acescg, axis=(0, 1))
+    assert app.detail(albedo) == pytest.approx(expected, rel=1e-9)
+    gray = app.detail(np.repeat(0.2 + 0.6 * rng.random((8, 8, 1)), 3, axis=-1))
+    assert np.ptp(gray, axis=-1).max() < 1e-9
+    with pytest.raises(lutgen.InputError, match="albedo is black throughout"):
+        app.detail(np.zeros((4, 4, 3)))
+
+
 def test_thin_parts_let_light_through(plain):
     """Lit from behind, a thin sheet glows red and a thick one does not."""
     look = Look(environment=0, light=10, light_azimuth=180, light_elevation=0, azimuth=0, elevation=0, distance_mm=300)
@@ -115,6 +128,21 @@ def test_maps_change_the_skin_where_they_are(plain):
     again = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
     assert np.all(darker[100:200, 100:200] < 0.9 * base[100:200, 100:200])
     assert np.array_equal(again, base)
+
+
+def test_maps_fade_on_skin_darker_than_they_were_painted_for(plain):
+    """By the power .38 of how much darker: a ratio of 4 at half of full contrast's melanin is 4^(2^-.38)."""
+    look = Look(melanin=0.04, azimuth=0, elevation=0, distance_mm=300, tier="off", transmission=0)
+    passes.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
+    made = {}
+    for full in (0.04, 0.02):
+        plain.full_contrast_melanin = full
+        linear(plain, look)
+        made[full] = gl.read(plain.targets["surface_buffer"], attachment=2)[160, 160, 0]
+    plain.full_contrast_melanin = 0.0292
+    passes.set_map(plain, "chromophores", None)
+    assert made[0.04] == pytest.approx(0.16, rel=2e-3)
+    assert made[0.02] == pytest.approx(0.04 * 4 ** (0.5**0.38), rel=2e-3)
 
 
 def test_oxygenation_reaches_the_textures_in_time(stage):
@@ -180,6 +208,9 @@ def test_screenshot_and_sheet_commands(tmp_path, capsys):
         (["--size", "wide"], 2, "for example 640x360"),
         (["--look", "none.toml"], 2, "look none.toml: cannot be read"),
         (["nowhere"], 2, "nowhere"),
+        (["--environment", "beach"], 2, "environment = beach: allowed is studio, none or a file ending in"),
+        (["--albedo", "paint"], 2, "albedo = 'paint': allowed is recolor, invert"),
+        (["--set", "environment_azimuth=200"], 2, "environment_azimuth = 200: allowed is -180 to 180"),
     ],
 )
 def test_bad_input_is_one_line(arguments, status, message, tmp_path, capsys, monkeypatch):
@@ -203,6 +234,45 @@ def test_a_set_of_another_version_is_one_line(tmp_path, capsys):
         assert "bake it anew" in error
         assert error.count("\n") == 1
     assert not (tmp_path / "out.png").exists()
+
+
+def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_path, monkeypatch):
+    pixel = np.full((1, 1, 3), 9, "u1")
+    square = Mesh(np.eye(4, 3, dtype="f4"), np.eye(4, 3, dtype="f4"), np.eye(4, 2, dtype="f4"), np.array([[0, 1, 2]]))
+    painted = {"chromophores": np.full((2, 2, 3), 2.0), "surface": np.full((2, 2, 4), 0.5), "normal": pixel}
+    monkeypatch.setattr(painting, "paint", lambda shape: dict(painted))
+    monkeypatch.setattr(painting, "notes", lambda shape: ("painted",))
+    textures_given = {}
+    monkeypatch.setattr(app.mesh, "of", lambda *given: replace(square, textures=textures_given, notes=(str(given),)))
+    shape, found = app.model("a.glb", 2.0, None, True)
+    assert shape.notes == ("('a.glb', 2.0, True)", "painted")
+    assert found.albedo is None
+    assert found.chromophores[0, 0, 0] == 2
+    textures_given |= {"albedo": np.full((1, 1, 3), 188, "u1"), "normal": pixel + 1}
+    _, found = app.model("a.glb", None, None)
+    assert found.chromophores is None  # it is in the albedo already
+    assert found.albedo[0, 0, 0] == pytest.approx(0.503, abs=1e-3)
+    assert found.normal[0, 0, 0] == 10
+    assert np.all(found.surface == 0.5)
+    Image.fromarray(np.full((1, 1), 255, "u1")).save(tmp_path / "occlusion.png")
+    Image.new("RGB", (1, 1), (128, 128, 255)).save(tmp_path / "normal.png")
+    _, found = app.model("a.glb", None, str(tmp_path))
+    assert found.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
+    assert found.normal[0, 0, 2] == 1
+    assert found.albedo is not None
+
+
+def test_a_head_without_texture_coordinates_is_drawn_and_said(tmp_path, capsys):
+    import trimesh
+
+    trimesh.creation.icosphere(2, 120).export(tmp_path / "ball.glb")
+    out = tmp_path / "out.png"
+    assert main(["view", "--screenshot", str(out), "--size", "64x48", "--mesh", str(tmp_path / "ball.glb"),
+                 "--albedo", "invert"]) == 0  # fmt: skip
+    said = capsys.readouterr().out
+    assert "ball.glb has no texture coordinates: maps, pores, freckles" in said
+    assert "no albedo to invert" in said
+    assert out.exists()
 
 
 def test_without_opengl_the_line_says_what_to_install(monkeypatch):

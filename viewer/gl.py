@@ -97,6 +97,17 @@ def texture(size: tuple[int, int], components: int = 4, kind: str = "f2", data: 
     return made
 
 
+def levels(pictures: list[np.ndarray]):
+    """A texture whose mip levels are given [rows, columns, 3], each half the size of the one before; wraps along x."""
+    made = context().texture(pictures[0].shape[1::-1], 3, dtype="f2")
+    made.build_mipmaps(0, len(pictures) - 1)
+    for level, picture in enumerate(pictures):
+        made.write(np.minimum(picture, 65504).astype("f2").tobytes(), level=level, alignment=1)
+    made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    made.repeat_x, made.repeat_y = True, False
+    return made
+
+
 def volume(values: np.ndarray):
     """A 3-D float texture of an array [depth, height, width, 4], read linearly between texel centers."""
     depth, height, width, components = values.shape

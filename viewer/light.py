@@ -53,15 +53,30 @@ def fibonacci(count: int) -> np.ndarray:
     return np.stack([r * np.cos(turn), y, r * np.sin(turn)], axis=1)
 
 
-def irradiance_sh(directions: np.ndarray, radiance: np.ndarray) -> np.ndarray:
-    """Cosine-convolved harmonics [9, 3] of radiance [N, 3] evenly spread (Ramamoorthi & Hanrahan 2001)."""
+def irradiance_sh(directions: np.ndarray, radiance: np.ndarray, angles: np.ndarray | None = None) -> np.ndarray:
+    """Cosine-convolved harmonics [9, 3] of radiance [N, 3] (Ramamoorthi & Hanrahan 2001).
+
+    `angles` [N]: solid angle of each direction; without it they are evenly spread.
+    """
+    angles = np.full(len(directions), 4 * np.pi / len(directions)) if angles is None else angles
     x, y, z = directions.T
     basis = np.stack([
         0.282095 + 0 * x, 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
         0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y),
     ])  # fmt: skip
     bands = np.array([np.pi] + [2 * np.pi / 3] * 3 + [np.pi / 4] * 5)
-    return bands[:, None] * (basis @ radiance) * (4 * np.pi / len(directions))
+    return bands[:, None] * ((basis * angles) @ radiance)
+
+
+def studio_irradiance() -> np.ndarray:
+    """Cosine-convolved harmonics [9, 3] of the studio."""
+    directions = fibonacci(4096)
+    return irradiance_sh(directions, studio(directions))
+
+
+def studio_mean() -> float:
+    """Mean radiance of the studio over all directions and channels."""
+    return float(studio(fibonacci(4096)).mean())
 
 
 def fresnel(cosine: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
-from lutgen import color, pores, scene
+from lutgen import color, environment, pores, scene
 from lutgen.errors import InputError, in_range
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
@@ -51,11 +51,12 @@ class Stage:
     center_mm: np.ndarray
     radius_mm: float
     maps: dict
-    environment: np.ndarray
-    environment_map: moderngl.Texture
+    irradiance: np.ndarray
+    environment_map: moderngl.Texture | None
     ggx: moderngl.Texture
     targets: dict = field(default_factory=dict)
     oxygenation: float | None = None
+    full_contrast_melanin: float = 0.0292
     milliseconds: dict[str, float] = field(default_factory=dict)
 
 
@@ -74,7 +75,6 @@ def open_stage(
     head = context.vertex_array(surface, [(buffer, "3f 3f 2f", "position", "normal", "uv")], indices)
     cast = context.vertex_array(shadow, [(buffer, "3f 20x", "position")], indices)
     center = (mesh.positions_mm.max(axis=0) + mesh.positions_mm.min(axis=0)) / 2
-    directions = light.fibonacci(4096)
     albedo = light.ggx_albedo().astype("f4")
     ggx = gl.texture((albedo.shape[1], albedo.shape[0]), 2, "f4", np.ascontiguousarray(albedo).tobytes())
     ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -85,7 +85,7 @@ def open_stage(
         size, sides, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS} | {"pores": _map(pores.texture(), (), 1.0)},
-        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx,
+        light.studio_irradiance(), None, ggx,
     )  # fmt: skip
     resize(stage, size)
     return stage
@@ -126,6 +126,17 @@ def set_map(stage: Stage, name: str, values: np.ndarray | None) -> None:
     """Exchange one of the head's maps."""
     stage.maps[name].release()
     stage.maps[name] = _map(values, _PLAIN[name])
+
+
+def set_environment(stage: Stage, radiance: np.ndarray | None) -> None:
+    """Exchange the light from all around: radiance [rows, 2 rows, 3] as of `environment.read`; None: the studio."""
+    if stage.environment_map is not None:
+        gl.free(stage.environment_map)
+    stage.environment_map, stage.irradiance = None, light.studio_irradiance()
+    if radiance is not None:
+        ways, angles = environment.directions(len(radiance))
+        stage.irradiance = light.irradiance_sh(ways.reshape(-1, 3), radiance.reshape(-1, 3), angles.ravel())
+        stage.environment_map = gl.levels(environment.blurred(radiance))
 
 
 def resize(stage: Stage, size: tuple[int, int]) -> None:
@@ -219,13 +230,14 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
     clip = camera.projection @ camera.view
     gl.put(stage.shadow, light_clip=clip)
     stage.head_shadow.render()  # depth alone first: then no pixel is shaded twice
+    around = stage.environment_map
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
             surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], pore_map=stage.maps["pores"],
-            shadow_map=stage.targets["cast"],
-            environment_map=stage.environment_map, ggx_albedo=stage.ggx)  # fmt: skip
+            shadow_map=stage.targets["cast"], environment_map=stage.ggx if around is None else around,
+            ggx_albedo=stage.ggx)  # fmt: skip
     grid = stage.sides["none"].luts.color_lut.grid
     axes = grid.melanin, grid.eumelanin, grid.hemoglobin
-    fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
+    fade = min(stage.full_contrast_melanin / look.melanin, 1.0)  # freckles and blotches show less on darker skin
     gl.put(
         program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
         shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
@@ -234,8 +246,9 @@ def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
         chromophores_low=tuple(a.low for a in axes), chromophores_high=tuple(a.high for a in axes),
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
-        environment_entry=light.entry_of_the_sky(), environment_levels=0, environment=look.environment,
-        irradiance_sh=stage.environment,
+        environment_entry=light.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
+        environment_levels=0 if around is None else environment.LEVELS,
+        environment_turn=tuple(f(np.radians(look.environment_azimuth)) for f in (np.cos, np.sin)),
     )  # fmt: skip
     stage.head.render()
 
@@ -285,7 +298,8 @@ def release(stage: Stage) -> None:
     volumes = {id(t): t for one in sides for t in (one.textures.color, one.textures.rings, one.textures.encircled)}
     laws = {id(law): law for law in (stage.compose, *(one.gather for one in sides))}
     gl.free(
-        *stage.targets.values(), *stage.maps.values(), *volumes.values(), stage.environment_map, stage.ggx, stage.head,
-        stage.head_shadow, stage.surface, stage.shadow, *stage.buffers,
+        *stage.targets.values(), *stage.maps.values(), *volumes.values(), stage.ggx, stage.head, stage.head_shadow,
+        stage.surface, stage.shadow, *stage.buffers,
+        *([] if stage.environment_map is None else [stage.environment_map]),
         *(part for law in laws.values() for part in (law.array, law.program, law.corners)),
     )  # fmt: skip

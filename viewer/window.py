@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import glfw
@@ -12,9 +13,6 @@ from imgui_bundle import imgui
 
 from lutgen import scene
 from lutgen.errors import InputError, MachineError
-from lutgen.lutset import LutSet
-from lutgen.maps import Maps
-from lutgen.mesh import Mesh
 from lutgen.scene import Look
 from lutgen.tissue import PRESETS
 
@@ -48,12 +46,11 @@ class State:
 
 
 def run(
-    luts: LutSet, shape: Mesh, given: Maps, look: Look, size: tuple[int, int], other: LutSet | None = None,
-    notes: tuple[str, ...] = (),
-) -> Look:  # fmt: skip
+    opened: Callable[[tuple[int, int]], passes.Stage], look: Look, size: tuple[int, int], notes: tuple[str, ...] = ()
+) -> Look:
     """Open a window whose picture has that size, until it is closed; the look at its end.
 
-    Raises MachineError where there is no display or no OpenGL 3.3.
+    `opened` makes the stage of a size in pixels. Raises MachineError where there is no display or no OpenGL 3.3.
     """
     window = _open((size[0] + panel.WIDTH, size[1]))
     try:
@@ -61,7 +58,7 @@ def run(
             gl.adopt(moderngl.create_context(require=330))
         except Exception as error:  # moderngl raises plain Exception
             raise MachineError(f"no OpenGL 3.3 ({' '.join(str(error).split())}); {gl.INSTALL_HINT}") from error
-        state = State(look, look, app.open_stage(luts, shape, given, size, other), notes)
+        state = State(look, look, opened(size), notes)
         drawer, copy = overlay.open_overlay(), gl.full_screen("copy.frag.glsl")
         _listen(window, state)
         since = time.perf_counter()
