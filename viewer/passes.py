@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import moderngl
@@ -12,7 +13,7 @@ from lutgen.errors import InputError, in_range
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
 
-from . import gl, light, textures
+from . import clock, gl, light, textures
 
 TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
 REFERENCE_FRAMES = 16
@@ -54,9 +55,15 @@ class Stage:
     environment: np.ndarray
     environment_map: moderngl.Texture
     ggx: moderngl.Texture
+    timer: clock.Clock
     targets: dict = field(default_factory=dict)
     oxygenation: float | None = None
     milliseconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def milliseconds(self) -> dict[str, float]:
+        """What the passes of the last `draw` took: shadow, surface, scattering, composition (viewer/clock.py)."""
+        return clock.milliseconds(self.timer)
 
 
 def open_stage(
@@ -86,6 +93,7 @@ def open_stage(
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
         light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx,
+        clock.open_clock(),
     )  # fmt: skip
     resize(stage, size)
     return stage
@@ -180,17 +188,26 @@ def draw(stage: Stage, look: Look, frame: int | None = None) -> None:
     """
     require(stage, look)
     camera = scene.camera(look, *stage.size)
+    clock.start(stage.timer)
     if not frame:
         set_oxygenation(stage, look.oxygenation)
-        _shadow(stage, look)
-        _surface(stage, look, camera)
+        with clock.timed(stage.timer, "shadow"):
+            _shadow(stage, look)
+        with clock.timed(stage.timer, "surface"):
+            _surface(stage, look, camera)
+    with clock.timed(stage.timer, "scattering"):
+        _halves(stage, look, camera, range(frames(look)) if frame is None else (frame,))
+    with clock.timed(stage.timer, "composition"):
+        _compose(stage, look)
+    gl.check()
+
+
+def _halves(stage: Stage, look: Look, camera: scene.Camera, added: Iterable[int]) -> None:
     width, height = (n * SAMPLES for n in stage.size)
     halves = [(0, width)] if look.split == "none" else [(0, width // 2), (width // 2, width)]
     for k, (left, right) in enumerate(halves):
-        for one in range(frames(look)) if frame is None else (frame,):
+        for one in added:
             _scatter(stage, look, camera, look.split if k else "none", (left, 0, right - left, height), one)
-    _compose(stage, look)
-    gl.check()
 
 
 def _light_clip(stage: Stage, look: Look) -> np.ndarray:
@@ -276,6 +293,7 @@ def pixels(stage: Stage) -> np.ndarray:
 
 def release(stage: Stage) -> None:
     """Free everything that the stage holds on the GPU."""
+    clock.release(stage.timer)
     sides = stage.sides.values()
     volumes = {id(t): t for one in sides for t in (one.textures.color, one.textures.rings, one.textures.encircled)}
     laws = {id(law): law for law in (stage.compose, *(one.gather for one in sides))}
