@@ -1,16 +1,17 @@
-"""What `lutgen view` and `lutgen sheet` do: options in, a window or a picture out."""
+"""What `lutgen view`, `lutgen sheet` and `lutgen bench --viewer` do: options in, a window, a picture or its cost out."""
 
 from __future__ import annotations
 
-import importlib
+import contextlib
 from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import ModuleType
 
 import lutgen
-from lutgen import manifest, scene
-from lutgen.errors import InputError, MachineError
+from lutgen import extras, manifest, scene
+from lutgen.errors import InputError
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -19,16 +20,7 @@ from lutgen.scene import Look
 Outcome = tuple[dict, str, int]
 SHEET_SIZE = "480x480"
 PICTURE_SIZE = "1280x720"
-
-
-def _viewer(module: str) -> ModuleType:
-    """A module of the viewer, which needs packages that a bake does not."""
-    try:
-        return importlib.import_module(f"lutgen.viewer.{module}")
-    except ImportError as error:
-        if (error.name or "").startswith("lutgen"):
-            raise
-        raise MachineError(f'the viewer needs {error.name}, which is missing: pip install "lutgen[view]"') from error
+TIMED_SIZE = "640x360"
 
 
 def look_of(options: Namespace) -> Look:
@@ -64,27 +56,67 @@ def _scene(options: Namespace, app: ModuleType) -> Scene:
     return Scene(luts, other, shape, given, (*shape.notes, *credit))
 
 
+@contextlib.contextmanager
+def _stage(one: Scene, app: ModuleType, size: tuple[int, int]) -> Iterator:
+    """The stage of a scene, freed in the end."""
+    stage = app.open_stage(one.luts, one.shape, one.given, size, one.other)
+    try:
+        yield stage
+    finally:
+        extras.viewer("passes").release(stage)
+
+
 def view(options: Namespace) -> Outcome:
     """Open a window, or draw one picture."""
-    look, app = look_of(options), _viewer("app")
+    look, app = look_of(options), extras.viewer("app")
     size = app.size_of(options.size or PICTURE_SIZE)
     one = _scene(options, app)
     if options.screenshot is None:
-        look = _viewer("window").run(one.luts, one.shape, one.given, look, size, one.other, one.said)
+        look = extras.viewer("window").run(one.luts, one.shape, one.given, look, size, one.other, one.said)
         said = {"look": asdict(look), "notes": list(one.said)}
         return said, "\n".join(one.said) or "closed", 0
-    app.write(app.picture(app.open_stage(one.luts, one.shape, one.given, size, one.other), look), options.screenshot)
+    with _stage(one, app, size) as stage:
+        app.write(app.picture(stage, look), options.screenshot)
     said = {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": list(one.said)}
     return said, "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *one.said]), 0
 
 
 def sheet(options: Namespace) -> Outcome:
     """Draw every preset beside the others."""
-    look, app = look_of(options), _viewer("app")
+    look, app = look_of(options), extras.viewer("app")
     size = app.size_of(options.size or SHEET_SIZE)
     one = _scene(options, app)
-    pixels = app.sheet(app.open_stage(one.luts, one.shape, one.given, size, one.other), look)
+    with _stage(one, app, size) as stage:
+        pixels = app.sheet(stage, look)
     app.write(pixels, options.out)
     said = {"sheet": options.out, "presets": list(scene.PRESETS), "notes": list(one.said)}
     shown = f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets"
     return said, "\n".join([shown, *one.said]), 0
+
+
+def bench(options: Namespace) -> Outcome:
+    """Time the built-in head: milliseconds by pass and tier, and over the same head without LUT and scattering."""
+    app, timing = extras.viewer("app"), extras.viewer("timing")
+    size = app.size_of(options.size or TIMED_SIZE)
+    result = timing.report(lutgen.load(), *app.model(None, None, None), size)
+    return result, _table(result), 0
+
+
+def _table(result: dict) -> str:
+    """The figures of `bench` as text."""
+    width, height = result["size"]
+    passes = list(next(iter(result["tiers"].values()))["milliseconds"])
+    lines = [
+        f"{result['renderer']}, {width} x {height}, medians of {result['rounds']} rounds in turn, milliseconds",
+        f"{'':10}{'taps':>8}" + "".join(f"{name:>13}" for name in (*passes, "frame")) + f"{'over plain':>13}",
+    ]
+    for cost in (result["plain"], *result["tiers"].values()):
+        taps = f"{cost['frames']} x {cost['taps']}" if cost["frames"] > 1 else f"{cost['taps']}"
+        times = [cost["milliseconds"].get(name) for name in passes] + [cost["total"]]
+        cells = "".join(f"{'-':>13}" if ms is None else f"{ms:13.1f}" for ms in times)
+        lines.append(f"{cost['name']:10}{taps:>8}{cells}{cost['ratio']:13.2f}")
+    lines.append(
+        f"plain: the same head with a color texture, no LUT, no scattering; another oxygenation reaches the GPU in "
+        f"{result['oxygenation_ms']:.1f} ms; LUT textures {result['lut_bytes'] / 1e6:.2f} MB"
+    )
+    return "\n".join(lines)

@@ -25,6 +25,7 @@ LEVELS = [
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
     {"axes", "tissue", "color", "sculpt"},
     {"chromophores"},
+    {"extras"},
     {"errors"},
 ]
 HEAVY = {

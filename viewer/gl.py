@@ -13,6 +13,7 @@ import numpy as np
 from lutgen.errors import MachineError
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install -y libegl1 libgl1-mesa-dri"
+ANISOTROPY = 8.0
 _CONTEXTS: list[moderngl.Context] = []
 _DEFAULT: list[moderngl.Framebuffer] = []
 
@@ -95,6 +96,23 @@ def texture(size: tuple[int, int], components: int = 4, kind: str = "f2", data: 
     made.filter = (moderngl.NEAREST, moderngl.NEAREST)
     made.repeat_x = made.repeat_y = False
     return made
+
+
+def image(values: np.ndarray) -> moderngl.Texture:
+    """A filtered texture of an array [rows, columns, channels], 0 to 1 in 8 bits or floats."""
+    if values.ndim == 2:
+        values = values[..., None]
+    kind = "f1" if values.dtype == np.uint8 else "f2"
+    data = np.ascontiguousarray(values if kind == "f1" else values.astype("f2"))
+    return filtered(context().texture(data.shape[1::-1], data.shape[2], data.tobytes(), alignment=1, dtype=kind))
+
+
+def filtered(texture: moderngl.Texture) -> moderngl.Texture:
+    """A texture read with mip levels, and sharp where it is seen aslant."""
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.anisotropy = ANISOTROPY
+    return texture
 
 
 def volume(values: np.ndarray):

@@ -117,17 +117,8 @@ def side(stage: Stage, split: str) -> Side:
 
 
 def _map(values: np.ndarray | None, plain: tuple[float, ...]) -> moderngl.Texture:
-    """A filtered texture of a map in 0 to 1 (8-bit) or of floats; of one plain texel where there is none."""
-    values = np.array([[plain]], "f4") if values is None else values
-    if values.ndim == 2:
-        values = values[..., None]
-    kind = "f1" if values.dtype == np.uint8 else "f2"
-    data = np.ascontiguousarray(values if kind == "f1" else values.astype("f2"))
-    made = gl.context().texture((data.shape[1], data.shape[0]), data.shape[2], data.tobytes(), alignment=1, dtype=kind)
-    made.build_mipmaps()
-    made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    made.anisotropy = 8.0
-    return made
+    """A map's texture; one plain texel where there is none."""
+    return gl.image(np.array([[plain]], "f4") if values is None else values)
 
 
 def set_map(stage: Stage, name: str, values: np.ndarray | None) -> None:
@@ -192,13 +183,13 @@ def draw(stage: Stage, look: Look, frame: int | None = None) -> None:
     if not frame:
         set_oxygenation(stage, look.oxygenation)
         with clock.timed(stage.timer, "shadow"):
-            _shadow(stage, look)
+            cast_shadow(stage, look)
         with clock.timed(stage.timer, "surface"):
-            _surface(stage, look, camera)
+            draw_surface(stage, look, camera, stage.surface, stage.head, stage.targets["surface_buffer"])
     with clock.timed(stage.timer, "scattering"):
         _halves(stage, look, camera, range(frames(look)) if frame is None else (frame,))
     with clock.timed(stage.timer, "composition"):
-        _compose(stage, look)
+        compose(stage, "scattered", "reflected", 2.0**look.exposure)
     gl.check()
 
 
@@ -218,7 +209,8 @@ def _light_clip(stage: Stage, look: Look) -> np.ndarray:
     return box @ scene.look_at(stage.center_mm + 2 * radius * way, stage.center_mm)
 
 
-def _shadow(stage: Stage, look: Look) -> None:
+def cast_shadow(stage: Stage, look: Look) -> None:
+    """The depth of the head as the light sees it."""
     buffer = stage.targets["shadow_buffer"]
     buffer.use()
     buffer.clear(depth=1.0)
@@ -227,29 +219,38 @@ def _shadow(stage: Stage, look: Look) -> None:
     stage.head_shadow.render()
 
 
-def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
-    program, buffer = stage.surface, stage.targets["surface_buffer"]
+def skin_of(stage: Stage, look: Look) -> dict:
+    """Uniforms that say what the look's skin is, and how far the maps change it."""
+    grid = stage.sides["none"].luts.color_lut.grid
+    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
+    return {
+        "chromophores": (look.melanin, look.eumelanin, look.hemoglobin), "contrast": (fade**0.38, fade**0.15),
+        "chromophores_low": tuple(a.low for a in axes), "chromophores_high": tuple(a.high for a in axes),
+    }  # fmt: skip
+
+
+def draw_surface(
+    stage: Stage, look: Look, camera: scene.Camera, program: moderngl.Program, seen: moderngl.VertexArray,
+    buffer: moderngl.Framebuffer, **more: moderngl.Texture,
+) -> None:  # fmt: skip
+    """Draw the head with a surface program into its buffer; `more` textures are its own."""
     buffer.use()
     buffer.clear(0.0, 0.0, 0.0, 0.0)
     gl.context().enable_only(moderngl.DEPTH_TEST)
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
             surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], shadow_map=stage.targets["cast"],
-            environment_map=stage.environment_map, ggx_albedo=stage.ggx)  # fmt: skip
-    grid = stage.sides["none"].luts.color_lut.grid
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
-    fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
+            environment_map=stage.environment_map, ggx_albedo=stage.ggx, **more)  # fmt: skip
     gl.put(
         program, view=camera.view, projection=camera.projection, light_clip=_light_clip(stage, look),
         shadow_offset_mm=0.6,
         light_direction=scene.light_direction(look), light_color=look.light * SUN, eye=camera.eye_mm,
-        chromophores=(look.melanin, look.eumelanin, look.hemoglobin), contrast=(fade**0.38, fade**0.15),
-        chromophores_low=tuple(a.low for a in axes), chromophores_high=tuple(a.high for a in axes),
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
         environment_entry=light.entry_of_the_sky(), environment_levels=0, environment=look.environment,
-        irradiance_sh=stage.environment,
+        irradiance_sh=stage.environment, **skin_of(stage, look),
     )  # fmt: skip
-    stage.head.render()
+    seen.render()
 
 
 SUN = np.array([1.0, 0.965, 0.9])
@@ -276,12 +277,13 @@ def _scatter(
     buffer.scissor = None
 
 
-def _compose(stage: Stage, look: Look) -> None:
+def compose(stage: Stage, scattered: str, reflected: str, exposure: float) -> None:
+    """The sum of two of the stage's targets as display colors."""
     program, buffer = stage.compose.program, stage.targets["pixel_buffer"]
     gl.context().enable_only(moderngl.NOTHING)
     buffer.use()
-    gl.bind(program, scattered=stage.targets["scattered"], reflected_light=stage.targets["reflected"])
-    gl.put(program, srgb_from_acescg=color.from_acescg(np.eye(3), "srgb").T, exposure=2.0**look.exposure,
+    gl.bind(program, scattered=stage.targets[scattered], reflected_light=stage.targets[reflected])
+    gl.put(program, srgb_from_acescg=color.from_acescg(np.eye(3), "srgb").T, exposure=exposure,
            samples=SAMPLES)  # fmt: skip
     stage.compose.array.render()
 

@@ -12,11 +12,17 @@ uniform float roughness, specular, bumps, entry, transmission, light_radius, sha
 in vec3 view_position, view_normal, world_position, world_normal;
 in vec2 texcoord;
 in vec3 light_position;
+#ifdef PLAIN_ALBEDO                         // the skin of a game without lutgen (viewer/plain.py)
+uniform sampler2D albedo_map;
+layout(location = 0) out vec4 seen;         // rgb: radiance; a: 1 where there is a head
+vec4 entering, facing, skin, reflected_light, detail;
+#else
 layout(location = 0) out vec4 entering;     // rgb: irradiance that enters; a: view depth in mm, 0 where there is no head
 layout(location = 1) out vec4 facing;       // rgb: view-space geometric normal; a: exit factor of the skin seen there
 layout(location = 2) out vec4 skin;         // melanin, eumelanin, hemoglobin; a: thickness in mm
 layout(location = 3) out vec4 reflected_light;  // rgb: specular; a: light on the far side of a thin part
 layout(location = 4) out vec4 detail;       // rgb: painted detail times albedo
+#endif
 
 float noise(vec2 p) { return fract(52.9829189 * fract(dot(p, vec2(0.06711056, 0.00583715)))); }
 
@@ -64,4 +70,7 @@ void main() {
     vec3 gloss = sun * specular_lobes(n, v, light_direction, rough) + grazing * mix(1.0, 0.6, pow(1.0 - nv, 2.0)) * around;
     float behind = transmission * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0);
     reflected_light = vec4(specular * surface.y * gloss, behind);
+#ifdef PLAIN_ALBEDO
+    seen = vec4(texture(albedo_map, texcoord).rgb * entering.rgb * facing.a / 3.14159265 + reflected_light.rgb, 1.0);
+#endif
 }
