@@ -1,12 +1,12 @@
 """The viewer's pictures: skin that follows the sliders, the same pixels every time, nothing left behind on the GPU."""
 
-import gc
 import importlib
 import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import gl_objects
 import numpy as np
 import pytest
 from PIL import Image
@@ -127,29 +127,48 @@ def test_oxygenation_reaches_the_textures_in_time(stage):
 
 
 def test_nothing_is_left_on_the_gpu():
-    """Objects of a stage that was opened, drawn, resized and released."""
+    """Objects of a stage that was opened, drawn, resized and released; queries are handed on, not made again."""
     shape, luts = head.builtin(), lutgen.load()
-
-    def alive() -> int:
-        gc.collect()
-        kinds = ("Texture", "Texture3D", "Buffer", "Program", "VertexArray", "Framebuffer", "Renderbuffer")
-        return sum(type(o).__name__ in kinds and type(o).__module__ == "moderngl" and not _released(o)
-                   for o in gc.get_objects())  # fmt: skip
-
-    gl.free()
-    before = alive()
+    before = gl_objects.alive()
     for _ in range(2):
         made = app.open_stage(luts, shape, Maps(), (32, 32))
         app.picture(made, Look(split="burley"))
         passes.resize(made, (48, 16))
         assert app.picture(made, Look()).shape == (16, 48, 3)
+        assert {kind for kind, _ in gl_objects.alive() - before} >= {*gl_objects.KINDS} - {"Query"}
         passes.release(made)
-    gl.check()
-    assert alive() == before
+        assert gl_objects.alive() - before == set()
 
 
-def _released(thing) -> bool:
-    return type(thing.mglo).__name__ == "InvalidObject"
+@pytest.mark.parametrize("kind", gl_objects.KINDS)
+def test_a_lost_object_is_seen(kind):
+    """What the check after every test of the viewer would find: an object whose only reference went away."""
+    context, before = gl.context(), gl_objects.orphans()
+    kept = [context.program("#version 330\nvoid main() { gl_Position = vec4(0); }", "#version 330\nvoid main() {}")]
+    make = {
+        "Texture": lambda: gl.texture((2, 2)), "Buffer": lambda: context.buffer(reserve=4),
+        "Framebuffer": lambda: context.framebuffer([kept.append(gl.texture((2, 2))) or kept[-1]]),
+        "Program": lambda: context.program("#version 330\nvoid main() { gl_Position = vec4(1); }"),
+        "VertexArray": lambda: context.vertex_array(kept[0], []),
+        "Renderbuffer": lambda: context.renderbuffer((2, 2)), "Query": _begun_query,
+    }  # fmt: skip
+    thing = make[kind]()
+    assert gl_objects.orphans() == before
+    name = getattr(thing, "glo", 0)
+    del thing
+    lost = gl_objects.orphans() - before
+    assert {one for one, _ in lost} == {kind}
+    for one, number in lost:
+        assert name in (0, number)
+        gl_objects.delete(one, number)
+    gl.free(*kept)
+
+
+def _begun_query():
+    query = gl.context().query(time=True)
+    with query:
+        pass
+    return query
 
 
 def test_screenshot_and_sheet_commands(tmp_path, capsys):
