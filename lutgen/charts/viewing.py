@@ -82,8 +82,8 @@ def errors(costs: list, extent: dict, progress: Callable = lambda stage, tally: 
                 }  # fmt: skip
                 worst = [max(values[k] for values in found.values()) for k in range(len(SCALES) + 1)]
                 tone = max(found, key=lambda name: found[name][0])
-                rows.append(Row(cost.name, profile, cost.taps, cost.frames, cost.total, cost.ratio, *worst[:3], tone,
-                                worst[3]))  # fmt: skip
+                rows.append(Row(cost.name, profile, cost.taps, cost.frames, cost.total, cost.ratio, worst[0], worst[1],
+                                worst[2], tone, worst[3]))  # fmt: skip
     finally:
         gl.free(*burley)
         laws.release(plane)
@@ -128,7 +128,8 @@ def _panel(axes, rows: list[Row], curves: list, title: str, ends: tuple[float, f
     most = max(row.ratio for row in rows)
     axes.set(xscale="log", yscale="log", xlim=(1.0, most * 1.12), ylim=ends, xlabel="frame time over a plain head's")
     axes.set_title(title, color=INK, pad=26)
-    ticks = [v for v in (1, 1.5, 2, 3, 5, 10, 20, 50) if v <= most * 1.12]
+    ticks = [v for v in (1, 2, 5, 10, 20, 50) if v <= most * 1.12] if most > 5 else [1, 1.5, 2, 3]
+    ticks = [v for v in ticks if v <= most * 1.12]
     axes.set_xticks(ticks, [f"{v:g} ×" for v in ticks])
     axes.set_yticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
     axes.xaxis.set_minor_formatter("")
@@ -138,7 +139,7 @@ def _panel(axes, rows: list[Row], curves: list, title: str, ends: tuple[float, f
     own = [row for row in rows if row.profile == LUT]
     for row in own:
         axes.axvline(row.ratio, color=drawing.RULE, linewidth=0.8, zorder=0)
-    log_places = drawing.apart([log10(row.ratio) for row in own], 0.1 * log10(most * 1.12))
+    log_places = drawing.apart([log10(row.ratio) for row in own], 0.13 * log10(most * 1.12))
     for row, place in zip(own, log_places, strict=True):
         axes.annotate(row.tier, (row.ratio, ends[1]), (10**place, ends[1] * 1.32), color=GRAY, size=8.5, ha="center",
                       annotation_clip=False, va="bottom",
