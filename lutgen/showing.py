@@ -1,4 +1,4 @@
-"""What `lutgen view`, `lutgen sheet` and `lutgen bench --viewer` do: options in, a window, a picture or its cost out."""
+"""What `lutgen view`, `sheet` and `bench --viewer` do: options in, a window, a picture or its cost out."""
 
 from __future__ import annotations
 

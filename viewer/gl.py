@@ -98,20 +98,21 @@ def texture(size: tuple[int, int], components: int = 4, kind: str = "f2", data: 
     return made
 
 
-def image(values: np.ndarray) -> moderngl.Texture:
+def image(values: np.ndarray, anisotropy: float = ANISOTROPY) -> moderngl.Texture:
     """A filtered texture of an array [rows, columns, channels], 0 to 1 in 8 bits or floats."""
     if values.ndim == 2:
         values = values[..., None]
     kind = "f1" if values.dtype == np.uint8 else "f2"
     data = np.ascontiguousarray(values if kind == "f1" else values.astype("f2"))
-    return filtered(context().texture(data.shape[1::-1], data.shape[2], data.tobytes(), alignment=1, dtype=kind))
+    made = context().texture(data.shape[1::-1], data.shape[2], data.tobytes(), alignment=1, dtype=kind)
+    return filtered(made, anisotropy)
 
 
-def filtered(texture: moderngl.Texture) -> moderngl.Texture:
+def filtered(texture: moderngl.Texture, anisotropy: float = ANISOTROPY) -> moderngl.Texture:
     """A texture read with mip levels, and sharp where it is seen aslant."""
     texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    texture.anisotropy = ANISOTROPY
+    texture.anisotropy = anisotropy
     return texture
 
 

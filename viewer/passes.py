@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
@@ -13,7 +13,7 @@ from lutgen.errors import InputError, in_range
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
 
-from . import clock, gl, light, textures
+from . import clock, gl, light, sides
 
 TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
 REFERENCE_FRAMES = 16
@@ -24,17 +24,6 @@ _MAPS = ("normal", "chromophores", "surface", "detail")
 _PLAIN = {"normal": (0.5, 0.5, 1.0, 1.0), "chromophores": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0),
           "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
 """What stands for a map that is not given: no bumps, the sliders' skin, no occlusion, too thick for light."""
-_LIGHT_SKIN = (0.0127, 0.7, 0.0077)
-
-
-@dataclass
-class Side:
-    """A LUT set as it is stored, as it is shown (at the look's oxygenation), on the GPU, and the pass that reads it."""
-
-    luts: LutSet
-    shown: LutSet
-    textures: textures.LutTextures
-    gather: gl.Pass
 
 
 @dataclass
@@ -42,7 +31,7 @@ class Stage:
     """Everything on the GPU: programs, head, maps, LUT sets by `Look.split`, targets of one size."""
 
     size: tuple[int, int]
-    sides: dict[str, Side]
+    sides: dict[str, sides.Side]
     surface: moderngl.Program
     shadow: moderngl.Program
     compose: gl.Pass
@@ -58,7 +47,6 @@ class Stage:
     timer: clock.Clock
     targets: dict = field(default_factory=dict)
     oxygenation: float | None = None
-    milliseconds: dict[str, float] = field(default_factory=dict)
 
     @property
     def milliseconds(self) -> dict[str, float]:
@@ -85,11 +73,9 @@ def open_stage(
     albedo = light.ggx_albedo().astype("f4")
     ggx = gl.texture((albedo.shape[1], albedo.shape[0]), 2, "f4", np.ascontiguousarray(albedo).tobytes())
     ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
-    sides = {"none": _side(luts, textures.upload(luts))}
-    if other is not None:
-        sides["set"] = _side(other, textures.upload(other))
+    shown = {name: sides.upload(one) for name, one in (("none", luts), ("set", other)) if one is not None}
     stage = Stage(
-        size, sides, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
+        size, shown, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
         light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx,
@@ -99,18 +85,10 @@ def open_stage(
     return stage
 
 
-def _side(luts: LutSet, uploaded: textures.LutTextures) -> Side:
-    made = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
-    return Side(luts, luts, uploaded, gl.full_screen("gather.frag.glsl", made))
-
-
-def side(stage: Stage, split: str) -> Side:
+def side(stage: Stage, split: str) -> sides.Side:
     """What shades a side of a split view; InputError where another LUT set is asked for and none was given."""
     if split == "burley" and split not in stage.sides:
-        plain = stage.sides["none"]
-        rings, within = textures.burley_tables(plain.luts, _LIGHT_SKIN)
-        tables = replace(plain.textures, rings=gl.volume(rings), encircled=gl.volume(within))
-        stage.sides[split] = replace(plain, textures=tables)
+        stage.sides[split] = sides.one_burley(stage.sides["none"])
     if split == "set" and split not in stage.sides:
         raise InputError("split = set: there is no other LUT set; give one with --compare DIR")
     return stage.sides["none" if split == "scattering" else split]
@@ -153,9 +131,7 @@ def set_oxygenation(stage: Stage, oxygenation: float) -> None:
         return
     for name in ("none", "set"):
         if name in stage.sides:
-            one = stage.sides[name]
-            one.shown = one.luts if oxygenation == one.luts.oxygenation else one.luts.expand(oxygenation=oxygenation)
-            textures.rewrite(one.textures, *textures.tables(one.shown))
+            sides.expand(stage.sides[name], oxygenation)
     stage.oxygenation = oxygenation
 
 
@@ -296,11 +272,9 @@ def pixels(stage: Stage) -> np.ndarray:
 def release(stage: Stage) -> None:
     """Free everything that the stage holds on the GPU."""
     clock.release(stage.timer)
-    sides = stage.sides.values()
-    volumes = {id(t): t for one in sides for t in (one.textures.color, one.textures.rings, one.textures.encircled)}
-    laws = {id(law): law for law in (stage.compose, *(one.gather for one in sides))}
+    sides.release(stage.sides)
+    compose = stage.compose
     gl.free(
-        *stage.targets.values(), *stage.maps.values(), *volumes.values(), stage.environment_map, stage.ggx, stage.head,
-        stage.head_shadow, stage.surface, stage.shadow, *stage.buffers,
-        *(part for law in laws.values() for part in (law.array, law.program, law.corners)),
+        *stage.targets.values(), *stage.maps.values(), stage.environment_map, stage.ggx, stage.head, stage.head_shadow,
+        stage.surface, stage.shadow, *stage.buffers, compose.array, compose.program, compose.corners,
     )  # fmt: skip
