@@ -98,6 +98,13 @@ def texture(size: tuple[int, int], components: int = 4, kind: str = "f2", data: 
     return made
 
 
+def table(values: np.ndarray) -> moderngl.Texture:
+    """A float texture of an array [rows, columns, channels], read linearly between texel centers."""
+    made = texture(values.shape[1::-1], values.shape[2], "f4", np.ascontiguousarray(values, "f4").tobytes())
+    made.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    return made
+
+
 def image(values: np.ndarray, anisotropy: float = ANISOTROPY) -> moderngl.Texture:
     """A filtered texture of an array [rows, columns, channels], 0 to 1 in 8 bits or floats."""
     if values.ndim == 2:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 REFRACTIVE_INDEX = 1.4
@@ -79,6 +81,7 @@ def entry_of_the_sky() -> float:
     return exit_mean() / float(1 - fresnel(np.ones(1))[0])
 
 
+@cache
 def ggx_albedo(size: int = 64, radial: int = 96, turns: int = 32) -> np.ndarray:
     """Directional albedo [roughness, root of cosine, 2] of one GGX lobe: at F = 1, and weighted with (1 - v.h)^5.
 

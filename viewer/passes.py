@@ -70,16 +70,13 @@ def open_stage(
     cast = context.vertex_array(shadow, [(buffer, "3f 20x", "position")], indices)
     center = (mesh.positions_mm.max(axis=0) + mesh.positions_mm.min(axis=0)) / 2
     directions = light.fibonacci(4096)
-    albedo = light.ggx_albedo().astype("f4")
-    ggx = gl.texture((albedo.shape[1], albedo.shape[0]), 2, "f4", np.ascontiguousarray(albedo).tobytes())
-    ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
     shown = {name: sides.upload(one) for name, one in (("none", luts), ("set", other)) if one is not None}
     stage = Stage(
         size, shown, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
-        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx,
-        clock.open_clock(),
+        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"),
+        gl.table(light.ggx_albedo()), clock.open_clock(),
     )  # fmt: skip
     resize(stage, size)
     return stage

@@ -46,6 +46,7 @@ def _bake(stage: passes.Stage, look: Look) -> moderngl.Texture:
     once = gl.full_screen("albedo.frag.glsl", {"functions.glsl": tables.functions})
     albedo = gl.texture(size, 4, "f1")
     target = gl.context().framebuffer([albedo])
+    sharp = {name: one.anisotropy for name, one in maps.items()}
     for one in maps.values():
         one.anisotropy = 1.0  # llvmpipe's filter for slanted views blurs straight ones too
     target.use()
@@ -54,8 +55,8 @@ def _bake(stage: passes.Stage, look: Look) -> moderngl.Texture:
             lut_color=tables.color)  # fmt: skip
     gl.put(once.program, **passes.skin_of(stage, look))
     once.array.render()
-    for one in maps.values():
-        one.anisotropy = gl.ANISOTROPY
+    for name, one in maps.items():
+        one.anisotropy = sharp[name]
     gl.free(target, once.array, once.program, once.corners)
     return gl.filtered(albedo)
 
