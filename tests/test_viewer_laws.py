@@ -1,11 +1,13 @@
 """What the viewer's scattering must obey, on a flat plane of known light: energy, the profile itself, little noise."""
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import lutgen
+from lutgen import color as color_module
 
 gl, laws = (importlib.import_module(f"lutgen.viewer.{name}") for name in ("gl", "laws"))
 TONES, SIDE = laws.TONES, laws.SIDE
@@ -95,19 +97,72 @@ def test_a_shader_fetches_what_numpy_interpolates(plane):
     assert np.abs(fetched(plane, nodes) / exact - 1).max() <= 2.0**-11
 
 
-def test_no_taps_where_the_profile_is_smaller_than_half_a_pixel(plane):
-    """There the picture without scattering is the picture: a disc's edge differs by less than 1/255."""
+def display(light, color):
+    """Display values [SIDE, SIDE, 3], 0 to 1, of light relative to a skin's ACEScg color."""
+    linear = np.clip(color_module.from_acescg(light * color, "srgb"), 0, 1)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+@pytest.fixture(scope="module")
+def forced(plane):
+    """The same plane with a gather that takes its taps however small the profile is."""
+    source, changed = (
+        gl.splice("gather.frag.glsl", {"functions.glsl": plane.tables.functions}),
+        "LEAST_FOOTPRINT = 0.0;",
+    )
+    context, old = gl.context(), "LEAST_FOOTPRINT = 0.25;"
+    assert source.count(old) == 1
+    program = context.program(vertex_shader=gl.splice("screen.vert.glsl"), fragment_shader=source.replace(old, changed))
+    array = context.vertex_array(program, [(plane.gather.corners, "2f", "corner")])
+    yield replace(plane, gather=gl.Pass(program, array, plane.gather.corners))
+    gl.free(array, program)
+
+
+def worst_change(plane, forced, tone, r99_pixels, taps):
+    """Largest difference of display values that a forced gather makes to the plain picture of a disc, and the scale."""
+    skin, light = laws.chromophores(tone), laws.disc()[..., None] * np.ones(3)
+    color = plane.luts.color(*skin, space="acescg")
+    scale = float(np.max(plane.luts.profile(*skin).radius_mm(0.99))) / r99_pixels
+    changes = []
+    for frame in range(3):
+        full = laws.scattered(forced, light, skin, scale, taps, frame) / color
+        changes += [np.abs(display(gain * full, color) - display(gain * light, color)).max() for gain in (1, 3)]
+    return max(changes), scale
+
+
+def test_no_taps_where_they_would_not_show(plane, forced):
+    """Level of detail: below r99 = 1/4 pixel none are taken, and all 64 would change no display value by 1/255.
+
+    Measured: 0.51/255 at 1/4 pixel, 4 to 5 at a third, 18 at a half: a pixel beside the disc is black, where the
+    display's curve is steepest.
+    """
+    light = laws.disc()[..., None] * np.ones(3)
     for tone in TONES:
         skin = laws.chromophores(tone)
-        profile = plane.luts.profile(*skin)
-        widest = max(np.atleast_1d(profile.radius_mm(0.99)))
-        scale = 2.02 * widest
-        light = np.repeat(laws.disc()[..., None], 3, axis=-1)
         color = plane.luts.color(*skin, space="acescg")
-        plain = laws.scattered(plane, light, skin, scale, 64) / color
-        assert plain == pytest.approx(light, abs=1e-5)  # no tap was taken
-        more = laws.scattered(plane, light, skin, widest / 2, 64) / color
-        assert np.abs(more - light).max() > 1 / 255
+        change, scale = worst_change(plane, forced, tone, 0.249, 64)
+        assert 0 < change < 1 / 255
+        assert laws.scattered(plane, light, skin, scale, 64) / color == pytest.approx(light, abs=1e-5)
+        change, scale = worst_change(plane, forced, tone, 0.5, 64)
+        assert change > 1 / 255
+        full, kept = (laws.scattered(one, light, skin, scale, 64) for one in (forced, plane))
+        assert np.array_equal(full, kept)  # above the limit nothing is left out
+
+
+def test_a_gather_of_pixels_cannot_tell_what_lies_within_one(plane, forced):
+    """Not taking taps is no farther from the truth than taking them: what is left is the pixel's size.
+
+    A profile of r99 = 1/4 pixel blurs a disc's edge by 4 to 5/255 of full light (7 at a half), which light kept by the
+    pixel cannot show, with any taps.
+    """
+    for tone in ("very-light", "dark"):
+        skin, light = laws.chromophores(tone), laws.disc()[..., None] * np.ones(3)
+        _, scale = worst_change(plane, forced, tone, 0.249, 64)
+        true = laws.blurred_disc(plane, tone, scale)
+        color = plane.luts.color(*skin, space="acescg")
+        full = np.mean([laws.scattered(forced, light, skin, scale, 64, f) for f in range(16)], axis=0) / color
+        assert np.abs(light - true).max() < np.abs(full - true).max() + 0.1 / 255
+        assert np.abs(light - true).max() < 5.5 / 255
 
 
 def test_what_another_skin_scatters_changes_only_there(plane):

@@ -28,7 +28,7 @@ PLACES = range(16)
 EDGE_MM_PER_PIXEL = 0.05
 _DEPTH_MM = 1e5
 _PARTS = 24  # a ring of a profile is spread over so many radii
-_FINE = 4  # points along a pixel's side that its mean is taken over
+_FINE = 8  # points along a pixel's side that its mean is taken over
 
 
 @dataclass(frozen=True)
@@ -100,11 +100,11 @@ def scattered(
     return gl.read(plane.target)[..., :3] * np.pi
 
 
-def disc(x: float = SIDE / 2, y: float = SIDE / 2, radius: float = DISC, fine: int = 8) -> np.ndarray:
+def disc(x: float = SIDE / 2, y: float = SIDE / 2, radius: float = DISC) -> np.ndarray:
     """Coverage [SIDE, SIDE] of a disc around (x, y), in pixels."""
-    at = (np.arange(SIDE * fine) + 0.5) / fine
+    at = (np.arange(SIDE * _FINE) + 0.5) / _FINE
     inside = np.hypot(at[None] - x, at[:, None] - y) < radius
-    return inside.reshape(SIDE, fine, SIDE, fine).mean(axis=(1, 3))
+    return inside.reshape(SIDE, _FINE, SIDE, _FINE).mean(axis=(1, 3))
 
 
 def half_plane() -> np.ndarray:
@@ -141,9 +141,9 @@ def blurred_disc(plane: Plane, tone: str, mm_per_pixel: float, radius: float = D
 def blurred_edge(plane: Plane, tone: str, mm_per_pixel: float) -> np.ndarray:
     """What should leave [SIDE, 3] across the edge of a lit left half-plane, relative to the skin's color."""
     rho, share = _points(plane, tone, mm_per_pixel)
-    fine = (np.arange(SIDE * 8) + 0.5) / 8 - SIDE / 2
+    fine = (np.arange(SIDE * _FINE) + 0.5) / _FINE - SIDE / 2
     lit = np.arccos(np.clip(fine[:, None] / rho, -1, 1)) / np.pi @ share
-    return lit.reshape(SIDE, 8, 3).mean(axis=1)
+    return lit.reshape(SIDE, _FINE, 3).mean(axis=1)
 
 
 def encircled(image: np.ndarray, x: float, y: float, radii: np.ndarray) -> np.ndarray:
