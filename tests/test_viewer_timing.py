@@ -42,6 +42,23 @@ def test_passes_are_timed_and_add_up_to_the_frame(stage):
         assert max(shares) > 0.8
 
 
+def test_the_shadow_is_cast_again_only_where_the_light_moved(stage):
+    look = Look(light_azimuth=70.0)
+    first = app.picture(stage, look)
+    stage.targets["shadow_buffer"].clear(depth=0.0)  # all in shadow, until it is cast again
+    dark = app.picture(stage, look)
+    assert dark.mean() < first.mean() - 2
+    assert np.array_equal(
+        app.picture(stage, replace(look, melanin=0.1)), app.picture(stage, replace(look, melanin=0.1))
+    )
+    assert np.array_equal(app.picture(stage, look), dark)
+    app.picture(stage, replace(look, light_azimuth=71.0))
+    assert np.array_equal(app.picture(stage, look), first)
+    passes.resize(stage, (96, 64))
+    passes.resize(stage, (160, 90))
+    assert np.array_equal(app.picture(stage, look), first)
+
+
 def test_what_takes_longer_is_told_to_take_longer(stage):
     taken = {}
     for tier in ("off", "reference"):

@@ -47,6 +47,7 @@ class Stage:
     timer: clock.Clock
     targets: dict = field(default_factory=dict)
     oxygenation: float | None = None
+    cast: np.ndarray | None = None
 
     @property
     def milliseconds(self) -> dict[str, float]:
@@ -119,7 +120,7 @@ def resize(stage: Stage, size: tuple[int, int]) -> None:
         "shadow_buffer": context.framebuffer(depth_attachment=cast),
         "scattered_buffer": context.framebuffer([scattered]), "pixel_buffer": context.framebuffer([pixels]),
     }  # fmt: skip
-    stage.size = size
+    stage.size, stage.cast = size, None
 
 
 def set_oxygenation(stage: Stage, oxygenation: float) -> None:
@@ -183,12 +184,16 @@ def _light_clip(stage: Stage, look: Look) -> np.ndarray:
 
 
 def cast_shadow(stage: Stage, look: Look) -> None:
-    """The depth of the head as the light sees it."""
+    """The depth of the head as the light sees it, drawn again where the light has moved since (`stage.cast`)."""
+    clip = _light_clip(stage, look)
+    if stage.cast is not None and np.array_equal(stage.cast, clip):
+        return
+    stage.cast = clip
     buffer = stage.targets["shadow_buffer"]
     buffer.use()
     buffer.clear(depth=1.0)
     gl.context().enable_only(moderngl.DEPTH_TEST)
-    gl.put(stage.shadow, light_clip=_light_clip(stage, look))
+    gl.put(stage.shadow, light_clip=clip)
     stage.head_shadow.render()
 
 
