@@ -164,6 +164,13 @@ def test_a_lost_object_is_seen(kind):
     gl.free(*kept)
 
 
+def test_a_pending_error_is_seen():
+    gl.context().enable_direct(0xBAD)
+    with pytest.raises(lutgen.MachineError, match="OpenGL: GL_INVALID_ENUM"):
+        gl.check()
+    gl.check()
+
+
 def _begun_query():
     query = gl.context().query(time=True)
     with query:

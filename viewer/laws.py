@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cache
 
 import moderngl
 import numpy as np
@@ -100,6 +101,7 @@ def scattered(
     return gl.read(plane.target)[..., :3] * np.pi
 
 
+@cache
 def disc(x: float = SIDE / 2, y: float = SIDE / 2, radius: float = DISC) -> np.ndarray:
     """Coverage [SIDE, SIDE] of a disc around (x, y), in pixels."""
     at = (np.arange(SIDE * _FINE) + 0.5) / _FINE

@@ -18,7 +18,7 @@ LUT, BURLEY = "profile per pixel", "one Burley"
 SCALES = (0.05, 0.2, 0.5)
 """Millimetres per pixel: a close-up, a portrait, a person."""
 QUICK = {"tiers": ("off", "medium", "high"), "tones": ("very-light", "dark"), "places": (0,),
-         "size": (320, 180), "rounds": 3}  # fmt: skip
+         "size": (320, 180), "rounds": 2}  # fmt: skip
 FULL = {"tiers": scene.TIERS, "tones": ("very-light", "light", "intermediate", "tan", "brown", "dark"),
         "places": range(16), "size": (640, 360), "rounds": 5}  # fmt: skip
 _WIDE, _HIGH = 13.4, 6.3
