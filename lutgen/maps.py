@@ -25,7 +25,8 @@ SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
 @dataclass(frozen=True)
 class Maps:
     """Textures for the viewer: `chromophores` ratios [.., .., 3], `surface` [.., .., 4] (roughness and specular ratio,
-    occlusion, thickness / 32 mm), `normal` [.., .., 3] in 0 to 1, `albedo` linear sRGB [.., .., 3]; None: not given."""
+    occlusion, thickness / 32 mm), `normal` [.., .., 3] in 0 to 1 (a fourth channel is the depth of the pores, which are
+    whole without it), `albedo` linear sRGB [.., .., 3]; None: not given."""
 
     chromophores: np.ndarray | None = None
     surface: np.ndarray | None = None

@@ -7,11 +7,11 @@ import numpy as np
 from lutgen import complexion, head
 from lutgen.mesh import Mesh
 
-MAP_SIZE = 1024
+MAP_SIZE = 2048
 
 
 def paint(shape: Mesh) -> dict[str, np.ndarray]:
-    """The built-in head's maps [1024, 1024, channels], first row lowest: `chromophores`, `surface`, `normal`.
+    """The built-in head's maps [2048, 2048, channels], first row lowest: `chromophores`, `surface`, `normal`.
 
     As `lutgen.maps.Maps` holds them.
     """

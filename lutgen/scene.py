@@ -39,20 +39,20 @@ class Look:
     split: str = "none"
     transmission: float = 1.0
     entry: float = 1.0
-    light_azimuth: float = 55.0
-    light_elevation: float = 28.0
-    light: float = 3.4
-    light_size: float = 6.0
-    environment: float = 1.0
+    light_azimuth: float = -30.0
+    light_elevation: float = 36.0
+    light: float = 4.2
+    light_size: float = 1.5
+    environment: float = 0.85
     roughness: float = 0.5
     specular: float = 1.0
     bumps: float = 1.0
     exposure: float = 0.0
-    azimuth: float = 14.0
-    elevation: float = 4.0
-    distance_mm: float = 640.0
+    azimuth: float = 18.0
+    elevation: float = 0.0
+    distance_mm: float = 545.0
     field_of_view: float = 23.0
-    target_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    target_mm: tuple[float, float, float] = (0.0, -12.0, 0.0)
 
     def __post_init__(self):
         for name, (low, high) in RANGES.items():

@@ -34,9 +34,9 @@ void main() {
                 vec3 l = mirrored(v, lobe == 0 ? roughness : second, t, turn);
                 if (l.z <= 0.0) continue;
                 float share = 3.0 * (1.0 - t) * (1.0 - t) / float(RADII * TURNS);
-                float light = law == 0 ? ggx(n, v, l, roughness, 1.0, 1.0) : specular_lobes(n, v, l, roughness);
+                float light = law == 0 ? ggx(n, v, l, roughness, 1.0, 1.0) : specular_lobes(n, v, l, roughness, second);
                 sum += share * light / (density(v, l, roughness) + density(v, l, second));
             }
-    float promised = mix(environment_lobe(nv, roughness), environment_lobe(nv, second), SECOND_WEIGHT);
+    float promised = mix(environment_lobe(lobe_albedo(nv, roughness)), environment_lobe(lobe_albedo(nv, second)), SECOND_WEIGHT);
     pixel = vec4(sum, promised, fresnel(nv), 1.0);
 }

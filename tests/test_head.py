@@ -57,6 +57,18 @@ def test_texture_coordinates_lie_in_the_texture_and_do_not_wrap(shape):
     assert (np.ptp(uv[shape[0].triangles][..., 0], axis=1) > 0.5).sum() < 20  # around the pole at the crown
 
 
+def test_no_triangle_lies_upside_down_in_the_texture(shape):
+    """Else the front of an ear and its back would share texels; what is left is around the pole at the crown."""
+    made, _ = shape
+    a, b, c = (made.uv[made.triangles[:, k]].astype(float) for k in range(3))
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    below = made.positions_mm[made.triangles].mean(axis=1)[:, 1] < 90
+    assert (area[below] <= 0).mean() < 0.001
+    around = np.arctan2(made.positions_mm[:, 0], made.positions_mm[:, 2] + 20)
+    plain = np.stack([around / 7, made.positions_mm[:, 1] / 340], axis=1)
+    assert np.array_equal(head.unfolded(plain, made.triangles[:0], np.ones(len(plain), bool)), plain)
+
+
 # Means and standard deviations of men and women, mm (Gordon et al. 2014, ANSUR II; nose and mouth: Farkas 1994).
 PUBLISHED = {
     "head breadth": (151, 7), "head length": (193, 9), "bizygomatic breadth": (138, 7), "menton to sellion": (117, 8),

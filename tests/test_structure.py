@@ -23,7 +23,7 @@ LEVELS = [
     {"probing", "head", "maps"},
     {"manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
-    {"axes", "tissue", "color", "sculpt"},
+    {"axes", "tissue", "color", "sculpt", "hair", "pores"},
     {"chromophores"},
     {"extras"},
     {"errors"},

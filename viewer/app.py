@@ -64,7 +64,7 @@ def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
     Multiplied with the color of any skin it is `LutSet.recolor` with the painted skin's own mean as base: the detail
     stays, the tone is the sliders'.
     """
-    acescg = np.maximum(albedo @ color.from_xyz(np.eye(3), "acescg").T @ np.linalg.inv(color.SRGB_FROM_XYZ).T, 1e-4)
+    acescg = np.maximum(color.from_xyz(albedo @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg"), 1e-4)
     painted = acescg.sum(axis=-1) > coverage * 3
     return np.clip(acescg / np.median(acescg[painted], axis=0), 0.05, 8)
 

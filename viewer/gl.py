@@ -13,7 +13,7 @@ import numpy as np
 from lutgen.errors import MachineError
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install -y libegl1 libgl1-mesa-dri"
-ANISOTROPY = 8.0
+ANISOTROPY = 2.0
 _CONTEXTS: list[moderngl.Context] = []
 _DEFAULT: list[moderngl.Framebuffer] = []
 

@@ -8,9 +8,9 @@ import numpy as np
 
 REFRACTIVE_INDEX = 1.4
 STUDIO = (  # direction, sharpness, color times strength
-    ((0.45, 0.55, 0.70), 14.0, (3.20, 3.10, 2.94)),
-    ((-0.85, 0.25, 0.45), 10.0, (0.83, 0.96, 1.10)),
-    ((0.30, 0.35, -0.90), 20.0, (2.50, 2.38, 2.25)),
+    ((-0.55, 0.60, 0.58), 14.0, (3.00, 2.90, 2.75)),
+    ((0.90, 0.20, 0.40), 10.0, (0.78, 0.80, 0.82)),
+    ((0.62, 0.30, -0.72), 28.0, (3.20, 3.10, 3.00)),
 )
 """Soft boxes: exp(sharpness (cos - 1)) lobes, linear ACEScg."""
 _GROUND, _SKY = np.array([0.088, 0.083, 0.080]), np.array([0.29, 0.31, 0.335])
@@ -40,7 +40,8 @@ def constants() -> str:
         f"const float STUDIO_SHARPNESS[{count}] = float[]({', '.join(f'{s:.1f}' for _, s, _ in STUDIO)});",
         f"const vec3 STUDIO_DIRECTION[{count}] = vec3[]({vectors(ways)});",
         f"const vec3 STUDIO_COLOR[{count}] = vec3[]({vectors(c for _, _, c in STUDIO)});",
-        f"const float EXIT_MEAN = {exit_mean():.9g};",
+        f"const int EXIT_MEANS = {len(exit_means())};",
+        f"const float EXIT_MEAN[EXIT_MEANS] = float[]({', '.join(f'{m:.9g}' for m in exit_means())});",
     ])  # fmt: skip
 
 
@@ -74,6 +75,16 @@ def exit_mean() -> float:
     x, w = np.polynomial.legendre.leggauss(64)
     c = (x + 1) / 2
     return float(((1 - fresnel(c)) * c * w).sum())
+
+
+def exit_means() -> np.ndarray:
+    """The same for rough skin, by roughness evenly from 0 to 1 [32]: mean of what one GGX lobe does not reflect."""
+    table = ggx_albedo()
+    whole, part = table[..., 0], table[..., 1]
+    f0 = fresnel(np.ones(1))
+    kept = (f0 * (whole - part) + part) * (1 + f0 * (1 / np.maximum(whole, 1e-6) - 1))
+    root = np.linspace(0, 1, table.shape[1])
+    return np.trapezoid((1 - kept) * 4 * root**3, root, axis=1)
 
 
 def entry_of_the_sky() -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
-from lutgen import color, scene
+from lutgen import color, pores, scene
 from lutgen.errors import InputError, in_range
 from lutgen.lutset import LutSet
 from lutgen.scene import Look
@@ -75,7 +75,7 @@ def open_stage(
     stage = Stage(
         size, shown, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
-        {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
+        {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS} | {"pores": gl.image(pores.texture(), 1.0)},
         light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"),
         gl.table(light.ggx_albedo()), clock.open_clock(),
     )  # fmt: skip
@@ -216,12 +216,17 @@ def draw_surface(
     buffer.use()
     buffer.clear(0.0, 0.0, 0.0, 0.0)
     gl.context().enable_only(moderngl.DEPTH_TEST)
+    gl.context().depth_func = "<="
+    clip = camera.projection @ camera.view
+    gl.put(stage.shadow, light_clip=clip)
+    stage.head_shadow.render()  # depth alone first: then no pixel is shaded twice
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
-            surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], shadow_map=stage.targets["cast"],
-            environment_map=stage.environment_map, ggx_albedo=stage.ggx, **more)  # fmt: skip
+            surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], pore_map=stage.maps["pores"],
+            shadow_map=stage.targets["cast"], environment_map=stage.environment_map, ggx_albedo=stage.ggx,
+            **more)  # fmt: skip
     gl.put(
-        program, view=camera.view, projection=camera.projection, light_clip=_light_clip(stage, look),
-        shadow_offset_mm=0.6,
+        program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
+        shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
         light_direction=scene.light_direction(look), light_color=look.light * SUN, eye=camera.eye_mm,
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,

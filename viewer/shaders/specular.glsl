@@ -25,13 +25,12 @@ float ggx(vec3 n, vec3 v, vec3 l, float roughness, float f, float f0) {
     return single * (1.0 + f0 * (1.0 / lobe_albedo(nv, roughness).x - 1.0));
 }
 
-float specular_lobes(vec3 n, vec3 v, vec3 l, float roughness) {
+float specular_lobes(vec3 n, vec3 v, vec3 l, float roughness, float second) {
     float f = fresnel(max(dot(v, normalize(v + l)), 0.0));
-    return mix(ggx(n, v, l, roughness, f, F0), ggx(n, v, l, roughness * SECOND_LOBE, f, F0), SECOND_WEIGHT);
+    return mix(ggx(n, v, l, roughness, f, F0), ggx(n, v, l, second, f, F0), SECOND_WEIGHT);
 }
 
 // What an even environment reflects: split-sum of one lobe (Karis 2013), the lost energy put back.
-float environment_lobe(float nv, float roughness) {
-    vec2 e = lobe_albedo(nv, roughness);
-    return (F0 * (e.x - e.y) + e.y) * (1.0 + F0 * (1.0 / e.x - 1.0));
+float environment_lobe(vec2 albedo) {
+    return (F0 * (albedo.x - albedo.y) + albedo.y) * (1.0 + F0 * (1.0 / albedo.x - 1.0));
 }
