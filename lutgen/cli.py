@@ -64,6 +64,8 @@ def _parser() -> argparse.ArgumentParser:
     check.set_defaults(run="lutgen.commands.check")
 
     bench = commands.add_parser("bench", help="speed of the trace, and time and error of a bake by stage")
+    bench.add_argument("--viewer", action="store_true", help="instead: milliseconds of a frame by pass and tier")
+    bench.add_argument("--size", default=None, help="with --viewer: pixels (default: 640x360)")
     bench.set_defaults(run="lutgen.commands.bench")
 
     figures = commands.add_parser("figures", help="the source document's results as charts and tables")

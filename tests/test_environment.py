@@ -12,7 +12,7 @@ from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
-app, gl, passes = (importlib.import_module(f"lutgen.viewer.{name}") for name in ("app", "gl", "passes"))
+app, gl, passes, stages = (importlib.import_module(f"lutgen.viewer.{n}") for n in ("app", "gl", "passes", "stages"))
 
 
 def coded(picture: np.ndarray) -> np.ndarray:
@@ -109,11 +109,11 @@ def plain():
     square = Mesh(corners, np.tile(np.array([0, 0, 1], "f4"), (4, 1)), None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
     made = app.open_stage(lutgen.load(), square, Maps(), (64, 64))
     yield made
-    passes.release(made)
+    stages.release(made)
     gl.check()
 
 
-LOOK = Look(entry=0, light=0, azimuth=0, elevation=0, distance_mm=300, tier="off", transmission=0)
+LOOK = Look(entry=0, light=0, environment=1, azimuth=0, elevation=0, distance_mm=300, tier="off", transmission=0)
 
 
 def seen(stage, **values) -> tuple[np.ndarray, np.ndarray]:
@@ -130,7 +130,7 @@ def test_even_surroundings_of_radiance_1_light_like_irradiance_pi(plain, tmp_pat
     """Then a skin shows the LUT's own color, and what it reflects does not depend on its place in the picture."""
     even = np.full((8, 16, 3), 1.0)
     (write_exr if kind == "exr" else lambda p, v: write_hdr(p, v, True))(tmp_path / f"even.{kind}", even)
-    passes.set_environment(plain, app.surroundings_of(str(tmp_path / f"even.{kind}")))
+    stages.set_environment(plain, app.surroundings_of(str(tmp_path / f"even.{kind}")))
     expected = lutgen.load().color(LOOK.melanin, LOOK.eumelanin, LOOK.hemoglobin, space="acescg")
     mirrored = []
     for turn in (0, 77):
@@ -141,27 +141,27 @@ def test_even_surroundings_of_radiance_1_light_like_irradiance_pi(plain, tmp_pat
                 mirrored.append(reflected)
     assert mirrored[0] == pytest.approx(mirrored[1], rel=1e-3)
     assert 0.02 < mirrored[0].min() <= mirrored[0].max() < 0.05  # Fresnel of skin head-on, .028, and what lies rougher
-    passes.set_environment(plain, None)
+    stages.set_environment(plain, None)
 
 
 def test_surroundings_turn_with_the_look(plain):
     """Light from the head's left reaches a face turned forward when it is turned by -90 degrees, its mirror too."""
     ways, _ = environment.directions(32)
     lamp = np.where((ways @ [1.0, 0, 0] > 0.9)[..., None], [5.0, 4.0, 3.0], 0.01)
-    passes.set_environment(plain, lamp)
+    stages.set_environment(plain, lamp)
     by_turn = {turn: seen(plain, environment_azimuth=turn) for turn in (-90, 0, 90, 180)}
     for part in range(2):
         front = by_turn[-90][part]
         assert all(np.all(front > 5 * by_turn[turn][part]) for turn in (0, 90, 180))
     assert by_turn[-90][0][0] / by_turn[-90][0][2] > 5 / 3
-    passes.set_environment(plain, None)
+    stages.set_environment(plain, None)
 
 
 def test_no_surroundings_are_dark_and_the_studio_comes_back(plain):
     before = seen(plain)
-    passes.set_environment(plain, app.surroundings_of("none"))
+    stages.set_environment(plain, app.surroundings_of("none"))
     assert max(part.max() for part in seen(plain)) == 0
-    passes.set_environment(plain, app.surroundings_of("studio"))
+    stages.set_environment(plain, app.surroundings_of("studio"))
     assert np.array_equal(seen(plain), before)
 
 

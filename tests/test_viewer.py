@@ -1,12 +1,12 @@
 """The viewer's pictures: skin that follows the sliders, the same pixels every time, nothing left behind on the GPU."""
 
-import gc
 import importlib
 import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import gl_objects
 import numpy as np
 import pytest
 from PIL import Image
@@ -18,7 +18,8 @@ from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
-app, gl, passes, textures = (importlib.import_module(f"lutgen.viewer.{n}") for n in ("app", "gl", "passes", "textures"))
+_NAMES = "app", "gl", "passes", "stages", "textures"
+app, gl, passes, stages, textures = (importlib.import_module(f"lutgen.viewer.{n}") for n in _NAMES)
 SIZE = (160, 160)
 
 
@@ -27,7 +28,7 @@ def stage():
     shape = head.builtin()
     made = app.open_stage(lutgen.load(), shape, Maps(**painting.paint(shape)), SIZE)
     yield made
-    passes.release(made)
+    stages.release(made)
     gl.check()
 
 
@@ -39,7 +40,7 @@ def plain():
     square = Mesh(corners, normals, None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
     made = app.open_stage(lutgen.load(), square, Maps(), SIZE)
     yield made
-    passes.release(made)
+    stages.release(made)
 
 
 def face(stage, look) -> np.ndarray:
@@ -113,18 +114,18 @@ def test_thin_parts_let_light_through(plain):
     for thickness in (1.0, 31.0):
         surface = np.ones((1, 1, 4), "f4")
         surface[..., 3] = thickness / 32
-        passes.set_map(plain, "surface", surface)
+        stages.set_map(plain, "surface", surface)
         seen.append(linear(plain, look)[160, 160])
-    passes.set_map(plain, "surface", None)
+    stages.set_map(plain, "surface", None)
     assert seen[0][0] > 5 * seen[0][2] > 0
     assert seen[1].max() < 0.01 * seen[0][0]
 
 
 def test_maps_change_the_skin_where_they_are(plain):
     base = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
-    passes.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
+    stages.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
     darker = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
-    passes.set_map(plain, "chromophores", None)
+    stages.set_map(plain, "chromophores", None)
     again = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
     assert np.all(darker[100:200, 100:200] < 0.9 * base[100:200, 100:200])
     assert np.array_equal(again, base)
@@ -133,14 +134,14 @@ def test_maps_change_the_skin_where_they_are(plain):
 def test_maps_fade_on_skin_darker_than_they_were_painted_for(plain):
     """By the power .38 of how much darker: a ratio of 4 at half of full contrast's melanin is 4^(2^-.38)."""
     look = Look(melanin=0.04, azimuth=0, elevation=0, distance_mm=300, tier="off", transmission=0)
-    passes.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
+    stages.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
     made = {}
     for full in (0.04, 0.02):
         plain.full_contrast_melanin = full
         linear(plain, look)
         made[full] = gl.read(plain.targets["surface_buffer"], attachment=2)[160, 160, 0]
     plain.full_contrast_melanin = 0.0292
-    passes.set_map(plain, "chromophores", None)
+    stages.set_map(plain, "chromophores", None)
     assert made[0.04] == pytest.approx(0.16, rel=2e-3)
     assert made[0.02] == pytest.approx(0.04 * 4 ** (0.5**0.38), rel=2e-3)
 
@@ -155,29 +156,55 @@ def test_oxygenation_reaches_the_textures_in_time(stage):
 
 
 def test_nothing_is_left_on_the_gpu():
-    """Objects of a stage that was opened, drawn, resized and released."""
+    """Objects of a stage that was opened, drawn, resized and released; queries are handed on, not made again."""
     shape, luts = head.builtin(), lutgen.load()
-
-    def alive() -> int:
-        gc.collect()
-        kinds = ("Texture", "Texture3D", "Buffer", "Program", "VertexArray", "Framebuffer", "Renderbuffer")
-        return sum(type(o).__name__ in kinds and type(o).__module__ == "moderngl" and not _released(o)
-                   for o in gc.get_objects())  # fmt: skip
-
-    gl.free()
-    before = alive()
+    before = gl_objects.alive()
     for _ in range(2):
         made = app.open_stage(luts, shape, Maps(), (32, 32))
         app.picture(made, Look(split="burley"))
-        passes.resize(made, (48, 16))
+        stages.resize(made, (48, 16))
         assert app.picture(made, Look()).shape == (16, 48, 3)
-        passes.release(made)
+        assert {kind for kind, _ in gl_objects.alive() - before} >= {*gl_objects.KINDS} - {"Query"}
+        stages.release(made)
+        assert gl_objects.alive() - before == set()
+
+
+@pytest.mark.parametrize("kind", gl_objects.KINDS)
+def test_a_lost_object_is_seen(kind):
+    """What the check after every test of the viewer would find: an object whose only reference went away."""
+    context, before = gl.context(), gl_objects.orphans()
+    kept = [context.program("#version 330\nvoid main() { gl_Position = vec4(0); }", "#version 330\nvoid main() {}")]
+    make = {
+        "Texture": lambda: gl.texture((2, 2)), "Buffer": lambda: context.buffer(reserve=4),
+        "Framebuffer": lambda: context.framebuffer([kept.append(gl.texture((2, 2))) or kept[-1]]),
+        "Program": lambda: context.program("#version 330\nvoid main() { gl_Position = vec4(1); }"),
+        "VertexArray": lambda: context.vertex_array(kept[0], []),
+        "Renderbuffer": lambda: context.renderbuffer((2, 2)), "Query": _begun_query,
+    }  # fmt: skip
+    thing = make[kind]()
+    assert gl_objects.orphans() == before
+    name = getattr(thing, "glo", 0)
+    del thing
+    lost = gl_objects.orphans() - before
+    assert {one for one, _ in lost} == {kind}
+    for one, number in lost:
+        assert name in (0, number)
+        gl_objects.delete(one, number)
+    gl.free(*kept)
+
+
+def test_a_pending_error_is_seen():
+    gl.context().enable_direct(0xBAD)
+    with pytest.raises(lutgen.MachineError, match="OpenGL: GL_INVALID_ENUM"):
+        gl.check()
     gl.check()
-    assert alive() == before
 
 
-def _released(thing) -> bool:
-    return type(thing.mglo).__name__ == "InvalidObject"
+def _begun_query():
+    query = gl.context().query(time=True)
+    with query:
+        pass
+    return query
 
 
 def test_screenshot_and_sheet_commands(tmp_path, capsys):

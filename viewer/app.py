@@ -15,7 +15,7 @@ from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
-from . import light, passes
+from . import light, passes, stages
 
 SIZE = (1280, 720)
 MAX_SIDE = 4096
@@ -124,21 +124,21 @@ def _shrunk(values: np.ndarray, most: int = 4096) -> np.ndarray:
 def open_stage(
     luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int], other: LutSet | None = None,
     around: np.ndarray | None = None,
-) -> passes.Stage:  # fmt: skip
+) -> stages.Stage:  # fmt: skip
     """The stage of a head, its maps, a LUT set, maybe another to compare it with, and light from all around."""
-    stage = passes.open_stage(shape, textures_of(given), luts, size, other)
+    stage = stages.open_stage(shape, textures_of(given), luts, size, other)
     stage.full_contrast_melanin = given.full_contrast_melanin
-    passes.set_environment(stage, around)
+    stages.set_environment(stage, around)
     return stage
 
 
-def picture(stage: passes.Stage, look: Look) -> np.ndarray:
+def picture(stage: stages.Stage, look: Look) -> np.ndarray:
     """One frame as 8-bit sRGB [height, width, 3], first row on top."""
     passes.draw(stage, look)
     return passes.pixels(stage)
 
 
-def sheet(stage: passes.Stage, look: Look, columns: int = 3, progress: Callable = lambda name: None) -> np.ndarray:
+def sheet(stage: stages.Stage, look: Look, columns: int = 3, progress: Callable = lambda name: None) -> np.ndarray:
     """Every preset beside the others, [rows x height, columns x width, 3], each with its name."""
     from PIL import Image, ImageDraw
 

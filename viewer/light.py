@@ -108,35 +108,37 @@ def entry_of_the_sky() -> float:
 
 
 @cache
-def ggx_albedo(size: int = 32, samples: int = 48) -> np.ndarray:
+def ggx_albedo(size: int = 64, radial: int = 96, turns: int = 32) -> np.ndarray:
     """Directional albedo [roughness, root of cosine, 2] of one GGX lobe: at F = 1, and weighted with (1 - v.h)^5.
 
-    Height-correlated Smith masking, visible normals drawn on a regular grid (Heitz 2018): weights G2 / G1 <= 1.
+    Height-correlated Smith masking; visible normals (Heitz 2018) on a regular grid, weights G2 / G1 <= 1. Half a turn
+    is enough, the other is its mirror image. Radii are dense at the rim, where the facets lean and masking sets in: of
+    an even grid, a smooth lobe's whole tail lies in the last cell. Nodes are right to 1e-4; between them, for lobes of
+    roughness .08 to 1, an energy divided by the table's is off by -0.3 to +0.11 % (32 nodes: -1.5 to +0.5).
     """
-    u, v = np.stack(np.meshgrid(*2 * [(np.arange(samples) + 0.5) / samples])).reshape(2, -1)
-    r, turn = np.sqrt(u), 2 * np.pi * v
-    table = np.zeros((size, size, 2))
-    for i, roughness in enumerate(np.linspace(0, 1, size)):
-        alpha = max(roughness, 0.02) ** 2
-        for j, c in enumerate(np.linspace(0, 1, size) ** 2):  # close at grazing, where it is steep
-            nv = max(c, 1e-3)
-            view = np.array([np.sqrt(1 - nv * nv), 0.0, nv])
-            seen = view * [alpha, alpha, 1.0]
-            seen /= np.linalg.norm(seen)
-            across = np.array([0.0, 1.0, 0.0])
-            along = np.cross(seen, across)
-            s = 0.5 * (1 + seen[2])
-            x = r * np.cos(turn)
-            y = (1 - s) * np.sqrt(1 - x * x) + s * r * np.sin(turn)
-            half = x[:, None] * across + y[:, None] * along + np.sqrt(np.maximum(1 - x * x - y * y, 0))[:, None] * seen
-            half = half * [alpha, alpha, 1.0]
-            half /= np.linalg.norm(half, axis=1, keepdims=True)
-            vh = half @ view
-            nl = 2 * vh * half[:, 2] - nv
-            masked, shadowed = (_smith(k, alpha) for k in (np.array(nv), np.maximum(nl, 1e-6)))
-            weight = np.where(nl > 0, (1 + masked) / (1 + masked + shadowed), 0)
-            table[i, j] = weight.mean(), (weight * (1 - np.clip(vh, 0, 1)) ** 5).mean()
-    return table
+    cosines = np.maximum(np.linspace(0, 1, size) ** 2, 1e-3)  # close at grazing, where it is steep
+    return np.stack([_lobe(cosines, roughness, radial, turns) for roughness in np.linspace(0, 1, size)])
+
+
+def _lobe(cosines: np.ndarray, roughness: float, radial: int, turns: int) -> np.ndarray:
+    """Both albedos [N, 2] of a lobe seen at cosines [N]."""
+    alpha, c = max(roughness, 0.02) ** 2, cosines[:, None, None]
+    t = (np.arange(radial) + 0.5) / radial
+    r = np.sqrt(1 - (1 - t) ** 3)[:, None]
+    share = ((1 - t) ** 2 / ((1 - t) ** 2).sum())[:, None] / turns
+    turn = np.pi * ((np.arange(turns) + 0.5) / turns - 0.5)
+    x, z = alpha * np.sqrt(1 - c * c), c  # the view where the facets' ellipsoid is a sphere
+    x, z = x / np.hypot(x, z), z / np.hypot(x, z)
+    across, s = r * np.cos(turn), (1 + z) / 2
+    along = (1 - s) * np.sqrt(1 - across**2) + s * r * np.sin(turn)
+    up = np.sqrt(np.maximum(1 - across**2 - along**2, 0))
+    half = np.stack(np.broadcast_arrays(alpha * (up * x - along * z), alpha * across, along * x + up * z))
+    half /= np.sqrt((half**2).sum(axis=0))
+    vh = half[0] * np.sqrt(1 - c * c) + half[2] * c
+    nl = 2 * vh * half[2] - c
+    masked, shadowed = _smith(c, alpha), _smith(np.maximum(nl, 1e-6), alpha)
+    weight = share * np.where(nl > 0, (1 + masked) / (1 + masked + shadowed), 0)
+    return np.stack([weight.sum(axis=(1, 2)), (weight * (1 - np.clip(vh, 0, 1)) ** 5).sum(axis=(1, 2))], axis=1)
 
 
 def _smith(cosine: np.ndarray, alpha: float) -> np.ndarray:

@@ -15,8 +15,9 @@ from lutgen.errors import InputError, MachineError
 from lutgen.scene import Look
 from lutgen.tissue import PRESETS
 
-from .passes import TAPS, Stage
+from .passes import TAPS
 from .picking import Picked
+from .stages import Stage
 
 WIDTH, _PICK_WIDTH = 300, 260
 SLIDERS = (

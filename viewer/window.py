@@ -16,7 +16,7 @@ from lutgen.errors import InputError, MachineError
 from lutgen.scene import Look
 from lutgen.tissue import PRESETS
 
-from . import app, gl, overlay, panel, passes, picking
+from . import app, gl, overlay, panel, passes, picking, stages
 
 KEYS = {
     glfw.KEY_BACKSPACE: imgui.Key.backspace, glfw.KEY_DELETE: imgui.Key.delete, glfw.KEY_ENTER: imgui.Key.enter,
@@ -35,7 +35,7 @@ class State:
 
     look: Look
     start: Look
-    stage: passes.Stage
+    stage: stages.Stage
     notes: tuple[str, ...]
     panel: panel.Panel = field(default_factory=panel.Panel)
     mouse: tuple[float, float] = (0.0, 0.0)
@@ -46,7 +46,7 @@ class State:
 
 
 def run(
-    opened: Callable[[tuple[int, int]], passes.Stage], look: Look, size: tuple[int, int], notes: tuple[str, ...] = ()
+    opened: Callable[[tuple[int, int]], stages.Stage], look: Look, size: tuple[int, int], notes: tuple[str, ...] = ()
 ) -> Look:
     """Open a window whose picture has that size, until it is closed; the look at its end.
 
@@ -70,7 +70,7 @@ def run(
             since = now
             glfw.swap_buffers(window)
         overlay.close(drawer)
-        passes.release(state.stage)
+        stages.release(state.stage)
         gl.free(copy.array, copy.program, copy.corners)
         gl.check()
         return state.look
@@ -121,7 +121,7 @@ def _frame(window, state: State, drawer: overlay.Overlay, copy: gl.Pass, seconds
                              lambda path: app.write(passes.pixels(state.stage), path))  # fmt: skip
     state.awake = AWAKE if state.look != before else max(state.awake - 1, 0)
     if state.stage.size != size:
-        passes.resize(state.stage, size)
+        stages.resize(state.stage, size)
         state.drawn = None
     if state.drawn != state.look:
         try:

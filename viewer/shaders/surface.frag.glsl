@@ -13,11 +13,17 @@ uniform float roughness, specular, bumps, entry, transmission, light_radius, sha
 in vec3 view_position, view_normal, world_position, world_normal;
 in vec2 texcoord;
 in vec3 light_position;
+#ifdef PLAIN_ALBEDO                         // the skin of a game without lutgen (viewer/plain.py)
+uniform sampler2D albedo_map;
+layout(location = 0) out vec4 seen;         // rgb: radiance; a: 1 where there is a head
+vec4 entering, facing, skin, reflected_light, detail;
+#else
 layout(location = 0) out vec4 entering;     // rgb: irradiance that enters; a: view depth in mm, 0 where there is no head
 layout(location = 1) out vec4 facing;       // rgb: view-space geometric normal; a: exit factor of the skin seen there
 layout(location = 2) out vec4 skin;         // melanin, eumelanin, hemoglobin; a: thickness in mm
 layout(location = 3) out vec4 reflected_light;  // rgb: specular; a: light on the far side of a thin part
 layout(location = 4) out vec4 detail;       // rgb: painted detail times albedo
+#endif
 
 // Light that leaves a rough surface at the cosine of an albedo, relative to the mean over all: all but what it reflects
 // from there inward, so that outlines do not turn black as under a polished surface.
@@ -90,4 +96,7 @@ void main() {
     float covered = (light_position.z - textureLod(shadow_map, light_position.xy, 0.0).r) * light_range_mm;
     float behind = transmission * open * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0) * (1.0 - smoothstep(1.5, 3.0, covered / (surface.w * 32.0 + 1.5)));
     reflected_light = vec4(specular * surface.y * gloss, behind);
+#ifdef PLAIN_ALBEDO
+    seen = vec4(texture(albedo_map, texcoord).rgb * entering.rgb * facing.a / 3.14159265 + reflected_light.rgb, 1.0);
+#endif
 }
