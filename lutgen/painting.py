@@ -7,6 +7,7 @@ on the back of a head: mottled, without lips and freckles.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,11 @@ def notes(shape: Mesh) -> tuple[str, ...]:
     return ()
 
 
+def origin_mm(shape: Mesh) -> np.ndarray:
+    """The point [3] of a head that lies between its ears; the mesh's own origin where no face was found."""
+    return _painted(shape).get("origin", np.zeros(3))
+
+
 def _painted(shape: Mesh) -> dict[str, np.ndarray]:
     if shape.uv is None or _lack(shape):
         return {}
@@ -71,33 +77,43 @@ def _paint(shape: Mesh, own: bool) -> dict[str, np.ndarray]:
     return {
         "chromophores": np.stack([melanin, plain, hemoglobin], axis=-1).astype("f2"),
         "surface": surface.astype("f2"), "normal": complexion.bumps(there, lip, p),
-        "face": np.array(own or fit is not None),
+        "face": np.array(own or fit is not None), "origin": np.zeros(3) if fit is None else fit.origin_mm,
     }  # fmt: skip
 
 
 def _in_texture(shape: Mesh, values: np.ndarray, size: int) -> np.ndarray:
-    """Vertex values [V, C] drawn into texture space [size, size, C]; texels outside are filled from their neighbors.
+    """Vertex values [V, C] at the texel centers [size, size, C]; texels outside are filled from their neighbors.
 
     Coordinates beyond 0 to 1 wrap around, as the texture does.
     """
     assert shape.uv is not None
     corners = shape.uv[shape.triangles].astype("f8") * size  # [T, 3, 2]
     corners -= size * np.floor(corners.min(axis=1, keepdims=True) / size)
-    wraps = corners.max(axis=1) > size * (1 + 1e-6)
-    extent = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
+    first = np.floor(corners.min(axis=1)).astype(int)
+    side = (np.ceil(corners.max(axis=1)).astype(int) - first).max(axis=1)
+    a, b, c = np.moveaxis(corners, 1, 0)
+    turns = np.linalg.inv(np.where(_flat(a, b, c)[:, None, None], np.eye(2), np.stack([b - a, c - a], axis=-1)))
     out = np.full((size, size, values.shape[1]), np.nan, "f4")
-    for low, high in ((0, 4), (4, 8), (8, 16), (16, 40), (40, 160), (160, 640), (640, 1e9)):
-        group = np.flatnonzero((extent >= low) & (extent < high))
-        steps = int(2 * min(high, 4 * size)) + 1
-        w = np.array([(i, j) for i in range(steps + 1) for j in range(steps + 1 - i)]) / steps
-        w = np.concatenate([w, 1 - w.sum(axis=1, keepdims=True)], axis=1)
-        for part in np.array_split(group, max(1, len(group) * len(w) // 2_000_000)):
-            if not len(part):
-                continue
-            at = np.floor(w @ corners[part]).astype(int)
-            at = np.where(wraps[part][:, None], at % size, np.clip(at, 0, size - 1)).reshape(-1, 2)
-            out[at[:, 1], at[:, 0]] = (w @ values[shape.triangles[part]]).reshape(len(at), -1)
+    for low, high in pairwise([0, *2 ** np.arange(1, 16)]):  # boxes of like sizes together
+        group = np.flatnonzero((side > low) & (side <= high) & ~_flat(a, b, c))
+        if not len(group):
+            continue
+        steps = np.stack(np.meshgrid(np.arange(high), np.arange(high)), axis=-1).reshape(-1, 2)
+        for part in np.array_split(group, max(1, len(group) * len(steps) // 500_000)):
+            texel = first[part][:, None] + steps
+            along = (texel + 0.5 - a[part][:, None]) @ turns[part].transpose(0, 2, 1)
+            w = np.concatenate([1 - along.sum(axis=-1, keepdims=True), along], axis=-1)
+            k, inside = np.nonzero((w >= -1e-9).all(axis=-1))
+            at = texel[k, inside] % size
+            corner = values[shape.triangles[part[k]]]
+            out[at[:, 1], at[:, 0]] = np.einsum("nk,nkc->nc", w[k, inside].astype("f4"), corner)
     return _filled(out)
+
+
+def _flat(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Whether triangles [T] have no area in the texture, corners [T, 2] in texels."""
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return np.abs(ux * vy - uy * vx) < 1e-9
 
 
 def _filled(picture: np.ndarray) -> np.ndarray:

@@ -65,6 +65,12 @@ class Placement:
             x = x + np.sign(x) * _read(self.flare_mm, z, y, _EAR_MM) * share
         return np.stack([x, y, z], axis=-1)
 
+    @property
+    def origin_mm(self) -> np.ndarray:
+        """The mesh's point [3] where the built-in head has its origin, between the ears."""
+        own, to = self.heights_mm.T
+        return np.array([self.middle_mm, np.interp(0, to, own), self.foremost_mm[0] - self.scale * self.foremost_mm[1]])
+
     def _height(self, y: np.ndarray) -> np.ndarray:
         own, to = self.heights_mm.T
         middle = np.interp(y, own, to)

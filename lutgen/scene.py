@@ -52,9 +52,9 @@ class Look:
     exposure: float = 0.0
     azimuth: float = 18.0
     elevation: float = 0.0
-    distance_mm: float = 545.0
+    distance_mm: float = 610.0
     field_of_view: float = 23.0
-    target_mm: tuple[float, float, float] = (0.0, -12.0, 0.0)
+    target_mm: tuple[float, float, float] = (0.0, -8.0, 0.0)
 
     def __post_init__(self):
         for name, (low, high) in RANGES.items():

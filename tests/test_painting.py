@@ -8,7 +8,7 @@ import trimesh
 
 from lutgen import head, mesh, painting, placing
 
-SIDE = 256
+SIDE = 512
 
 
 def moved() -> mesh.Mesh:
@@ -45,6 +45,8 @@ def test_a_head_moved_and_scaled_gets_its_own_paint_back(both):
     for channel, where, least in ((0, face, 0.85), (2, face, 0.9), (2, ears, 0.75)):
         a, b = at_vertices(shape, own["chromophores"])[where], at_vertices(other, found["chromophores"])[where]
         assert np.corrcoef(a[:, channel], b[:, channel])[0, 1] > least, channel
+    assert painting.origin_mm(shape).tolist() == [0, 0, 0]
+    assert painting.origin_mm(other) == pytest.approx([17, -80, 33], abs=2)
     lips = [at_vertices(s, maps["chromophores"])[:, 2] > 2.2 for s, maps in ((shape, own), (other, found))]
     assert (lips[0] & lips[1]).sum() > 0.85 * (lips[0] | lips[1]).sum() > 100
 

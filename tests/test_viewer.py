@@ -269,10 +269,12 @@ def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_pa
     painted = {"chromophores": np.full((2, 2, 3), 2.0), "surface": np.full((2, 2, 4), 0.5), "normal": pixel}
     monkeypatch.setattr(painting, "paint", lambda shape: dict(painted))
     monkeypatch.setattr(painting, "notes", lambda shape: ("painted",))
+    monkeypatch.setattr(painting, "origin_mm", lambda shape: np.array([1.0, 2.0, 3.0]))
     textures_given = {}
     monkeypatch.setattr(app.mesh, "of", lambda *given: replace(square, textures=textures_given, notes=(str(given),)))
     shape, found = app.model("a.glb", 2.0, None, True)
     assert shape.notes == ("('a.glb', 2.0, True)", "painted")
+    assert np.array_equal(shape.positions_mm, np.eye(4, 3) - [1, 2, 3])
     assert found.albedo is None
     assert found.chromophores[0, 0, 0] == 2
     textures_given |= {"albedo": np.full((1, 1, 3), 188, "u1"), "normal": pixel + 1}

@@ -38,7 +38,8 @@ def model(name: str | None, mm_per_unit: float | None, folder: str | None, flip_
     """The head and its maps: built-in without a name; painted maps, under the file's own, under those of a folder.
 
     Skin that is painted into an albedo is not painted a second time: beside one, lips and freckles are its own, and
-    only gloss, pores, open sky and thickness are generated.
+    only gloss, pores, open sky and thickness are generated. Where a face is found the head is moved so that the
+    camera looks at it.
     """
     shape = head.builtin() if name is None else mesh.of(name, mm_per_unit, flip_v)
     found = Maps(**painting.paint(shape))
@@ -48,7 +49,8 @@ def model(name: str | None, mm_per_unit: float | None, folder: str | None, flip_
         found = replace(found, normal=shape.textures["normal"])
     if folder is not None:
         found = maps.load(Path(folder), found)
-    return replace(shape, notes=(*shape.notes, *painting.notes(shape))), found
+    centered = (shape.positions_mm - painting.origin_mm(shape)).astype("f4")
+    return replace(shape, positions_mm=centered, notes=(*shape.notes, *painting.notes(shape))), found
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
