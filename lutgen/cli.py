@@ -64,6 +64,8 @@ def _parser() -> argparse.ArgumentParser:
     check.set_defaults(run="lutgen.commands.check")
 
     bench = commands.add_parser("bench", help="speed of the trace, and time and error of a bake by stage")
+    bench.add_argument("--viewer", action="store_true", help="instead: milliseconds of a frame by pass and tier")
+    bench.add_argument("--size", default=None, help="with --viewer: pixels (default: 640x360)")
     bench.set_defaults(run="lutgen.commands.bench")
 
     figures = commands.add_parser("figures", help="the source document's results as charts and tables")
@@ -84,8 +86,14 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
         command.add_argument("--mesh", metavar="FILE", help="GLB, glTF, OBJ or lee-perry-smith (default: built-in)")
         command.add_argument("--mm-per-unit", type=float, help="millimetres per unit of the mesh (default: a guess)")
+        command.add_argument("--flip-v", action="store_true", help="turn the mesh's texture coordinates upside down")
         command.add_argument("--maps", metavar="DIR", help="texture maps by name: melanin.png, normal.png, ...")
         command.add_argument("--compare", metavar="DIR", help="another LUT set, the right half with --set split=set")
+        command.add_argument("--albedo", default="recolor", help="a painted albedo: recolor it or invert it to maps")
+        command.add_argument(
+            "--environment", default="studio", metavar="NAME", help="studio, none or an equirectangular .exr or .hdr"
+        )
+        command.add_argument("--normalize-environment", action="store_true", help="as bright on average as the studio")
         command.add_argument("--look", metavar="FILE", help="look that the viewer saved (TOML)")
         command.add_argument("--preset", help="chromophores of a preset: light, dark, ...")
         command.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one value of the look")

@@ -163,7 +163,13 @@ def check(options: Namespace) -> Outcome:
 
 
 def bench(options: Namespace) -> Outcome:
-    """`lutgen bench`: events per second, lanes against one lane, and a bake by stage."""
+    """`lutgen bench`: events per second, lanes against one lane, and a bake by stage; or the viewer's frames."""
+    if options.viewer:
+        from lutgen import showing
+
+        return showing.bench(options)
+    if options.size is not None:
+        raise InputError(f"size = {options.size}: only frames have a size; add --viewer")
     from lutgen import benchmark
 
     result = benchmark.run(options.device)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import hashlib
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ SCANS = {
     "lee-perry-smith": {
         "attribution": "Infinite, 3D Head Scan by Lee Perry-Smith, www.triplegangers.com, CC-BY 3.0",
         "mm_per_unit": 47.5,
+        "flip_v": True,  # its coordinates are v-up though glTF's are v-down
         "files": {
             "head": (_LEE + "LeePerrySmith.glb", "402b8a8ac9f03232e6d64b5962929703a069daf99d3c49ac8eb0e48bedc9c576"),
             "albedo": (_LEE + "Map-COL.jpg", "e976d73b31407f8d0967412bf468019ed26a5d5a32cf5811aabff7e816458a65"),
@@ -26,7 +28,8 @@ SCANS = {
         },
     }
 }  # fmt: skip
-"""Scans that are fetched by name: where from, with which SHA-256, and whom to name."""
+"""Scans that are fetched by name and known again by content: where from, with which SHA-256, and whom to name."""
+_SHORT_NAMES = {"albedo": "albedo.jpg", "normal": "normal_tangent.jpg"}
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,23 @@ class Mesh:
     attribution: str = ""
 
 
-def load(path: Path, mm_per_unit: float | None = None) -> Mesh:
+def of(name: str, mm_per_unit: float | None = None, flip_v: bool = False) -> Mesh:
+    """The scan of that name or the head of that file; a file that is a known scan is read as the scan is.
+
+    A known scan brings its own scale unless one is given, and its own direction of v.
+    """
+    if name in SCANS:
+        return scan(name)
+    path = Path(name)
+    mark = _sha256(path) if path.is_file() else ""
+    known = next((one for one in SCANS.values() if one["files"]["head"][1] == mark), None)
+    return load(path, mm_per_unit, flip_v) if known is None else _scanned(known, path, mm_per_unit)
+
+
+def load(path: Path, mm_per_unit: float | None = None, flip_v: bool = False) -> Mesh:
     """A head of a file; without `mm_per_unit` its height decides, and a note says so.
+
+    `flip_v` is for files whose v runs the other way than their format's.
 
     Raises InputError for a file that is missing, of another kind, broken, without triangles or with NaN.
     """
@@ -71,16 +89,25 @@ def load(path: Path, mm_per_unit: float | None = None) -> Mesh:
     if mm_per_unit is None:
         mm_per_unit, note = _guess(high - low)
         notes.append(note)
-    uv = getattr(whole.visual, "uv", None)
-    if uv is None or len(uv) != len(positions) or not np.all(np.isfinite(uv)):
-        uv = None
-        notes.append(f"{path.name} has no texture coordinates: maps, pores and freckles are not shown")
-    else:
-        uv = np.asarray(uv, "f4").copy()
+    uv, lack = _coordinates(whole)
+    if uv is None:
+        notes.append(f"{path.name} {lack}: maps, pores, freckles, occlusion and thickness are left out; unwrap it")
+    elif flip_v:
+        uv[:, 1] = 1 - uv[:, 1]
     positions = (positions - (low + high) / 2) * mm_per_unit
     return Mesh(
         positions.astype("f4"), normals(positions, triangles), uv, triangles, _pictures(whole), tuple(notes)
     )  # fmt: skip
+
+
+def _coordinates(whole) -> tuple[np.ndarray | None, str]:
+    """Texture coordinates [V, 2], or None and what is wrong with them."""
+    uv = getattr(whole.visual, "uv", None)
+    if uv is None or len(uv) != len(whole.vertices):
+        return None, "has no texture coordinates"
+    if not np.all(np.isfinite(uv)):
+        return None, "has texture coordinates that are NaN"
+    return np.asarray(uv, "f4").copy(), ""
 
 
 def _read(path: Path):
@@ -141,20 +168,35 @@ def normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def scan(name: str) -> Mesh:
     """A scan that is fetched once by its address and SHA-256, with its attribution; MachineError where offline."""
-    from PIL import Image
-
     known = SCANS[name]
     paths = {part: _fetch(*source) for part, source in known["files"].items()}
-    shape = load(paths["head"], known["mm_per_unit"])
-    pictures = {}
-    for part in ("albedo", "normal"):
-        with Image.open(paths[part]) as image:
-            pictures[part] = np.asarray(image.convert("RGB"))[::-1].copy()
-    # Its texture coordinates are v-up though glTF's are v-down, and trimesh has turned them over.
-    uv = None if shape.uv is None else np.stack([shape.uv[:, 0], 1 - shape.uv[:, 1]], axis=1)
-    return Mesh(
-        shape.positions_mm, shape.normals, uv, shape.triangles, pictures, shape.notes, known["attribution"]
-    )  # fmt: skip
+    return _scanned(known, paths["head"], None, {part: path for part, path in paths.items() if part != "head"})
+
+
+def _scanned(known: dict, path: Path, mm_per_unit: float | None, pictures: dict[str, Path] | None = None) -> Mesh:
+    """A known scan from its file, with its pictures from where they are said to be or from beside it."""
+    from PIL import Image
+
+    shape = load(path, known["mm_per_unit"] if mm_per_unit is None else mm_per_unit, known["flip_v"])
+    found, notes = {}, list(shape.notes)
+    for part, short in _SHORT_NAMES.items():
+        url, mark = known["files"][part]
+        beside = [path.parent / name for name in (short, Path(url).name)]
+        places = beside if pictures is None else [pictures[part]]
+        place = next((p for p in places if p.is_file() and _sha256(p) == mark), None)
+        if place is None:
+            notes.append(f"the scan's {part} map does not lie beside it ({short} or {Path(url).name}): left out")
+            continue
+        with Image.open(place) as image:
+            found[part] = np.asarray(image.convert("RGB"))[::-1].copy()
+    return replace(shape, textures=found, notes=tuple(notes), attribution=known["attribution"])
+
+
+def _sha256(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def _fetch(url: str, sha256: str) -> Path:

@@ -21,6 +21,7 @@ TIERS = ("off", "low", "medium", "high", "reference")
 SPLITS = ("none", "scattering", "burley", "set")
 """What the right half of a split view shows instead: no scattering, one light-skin Burley, or another LUT set."""
 ENVIRONMENTS = ("studio", "none")
+"""Surroundings without a file."""
 
 
 @dataclass(frozen=True)
@@ -39,20 +40,21 @@ class Look:
     split: str = "none"
     transmission: float = 1.0
     entry: float = 1.0
-    light_azimuth: float = 55.0
-    light_elevation: float = 28.0
-    light: float = 3.4
-    light_size: float = 6.0
-    environment: float = 1.0
+    light_azimuth: float = -30.0
+    light_elevation: float = 36.0
+    light: float = 4.2
+    light_size: float = 1.5
+    environment: float = 0.85
+    environment_azimuth: float = 0.0
     roughness: float = 0.5
     specular: float = 1.0
     bumps: float = 1.0
     exposure: float = 0.0
-    azimuth: float = 14.0
-    elevation: float = 4.0
-    distance_mm: float = 640.0
+    azimuth: float = 18.0
+    elevation: float = 0.0
+    distance_mm: float = 610.0
     field_of_view: float = 23.0
-    target_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    target_mm: tuple[float, float, float] = (0.0, -8.0, 0.0)
 
     def __post_init__(self):
         for name, (low, high) in RANGES.items():
@@ -69,6 +71,7 @@ RANGES = {
     "melanin": chromophores.MELANIN, "eumelanin": chromophores.EUMELANIN, "hemoglobin": chromophores.HEMOGLOBIN,
     "oxygenation": chromophores.OXYGENATION, "transmission": (0, 2), "entry": (0, 1), "light_azimuth": (-180, 180),
     "light_elevation": (-90, 90), "light": (0, 20), "light_size": (0, 40), "environment": (0, 10),
+    "environment_azimuth": (-180, 180),
     "roughness": (0.15, 1), "specular": (0, 2), "bumps": (0, 3), "exposure": (-8, 8), "azimuth": (-180, 180),
     "elevation": (-89, 89), "distance_mm": (40, 5000), "field_of_view": (5, 90),
 }  # fmt: skip

@@ -48,6 +48,30 @@ def test_a_folder_becomes_textures(tmp_path):
     assert found.albedo[0, 0] == pytest.approx([1, 0.503, 0], abs=1e-3)
 
 
+def test_each_map_replaces_one_and_leaves_the_others(tmp_path):
+    chromophores = np.broadcast_to(np.array([1.5, 1.0, 2.0]), (4, 4, 3))
+    surface = np.broadcast_to(np.array([0.9, 1.1, 0.7, 0.25]), (4, 4, 4))
+    under = maps.Maps(chromophores, surface, np.full((4, 4, 3), 128, "u1"))
+    Image.fromarray(np.full((8, 2), 51, "u1")).save(tmp_path / "occlusion.png")
+    found = maps.load(tmp_path, under)
+    assert found.surface is not None
+    assert found.surface.shape == (8, 4, 4)
+    assert found.surface[3, 2] == pytest.approx([0.9, 1.1, 0.2, 0.25])
+    assert found.chromophores is not None
+    assert np.array_equal(found.chromophores, chromophores)
+    assert found.normal is under.normal
+    Image.fromarray(maps.encode_ratio(np.full((4, 4), 3.0))).save(tmp_path / "melanin.png")
+    found = maps.load(tmp_path, under)
+    assert found.chromophores is not None
+    assert found.chromophores[0, 0] == pytest.approx([3, 1, 2], rel=0.02)
+    Image.new("RGB", (4, 4), (200, 150, 120)).save(tmp_path / "albedo.png")
+    found = maps.load(tmp_path, under)
+    assert found.chromophores is not None
+    assert found.chromophores[0, 0] == pytest.approx([3, 1, 1], rel=0.02)  # what was generated lies in the albedo
+    (tmp_path / "melanin.png").unlink()
+    assert maps.load(tmp_path, under).chromophores is None
+
+
 def test_what_cannot_be_read_is_one_line(tmp_path):
     with pytest.raises(lutgen.InputError, match="no such folder"):
         maps.load(tmp_path / "none")
@@ -62,6 +86,29 @@ def test_what_cannot_be_read_is_one_line(tmp_path):
     (tmp_path / "melanin.png").unlink()
     with pytest.raises(lutgen.InputError, match="NaN"):
         maps.load(tmp_path)
+    (tmp_path / "melanin.exr").write_bytes(b"v/1\1 broken")
+    with pytest.raises(lutgen.InputError, match=r"map .*melanin\.exr: not a whole OpenEXR file, or"):
+        maps.load(tmp_path)
+    exr.write(tmp_path / "melanin.exr", [exr.Part("map", {"Y": np.full((2, 2), -0.5, "f4")}, {})])
+    with pytest.raises(lutgen.InputError, match=r"melanin\.exr: holds negative values, down to -0.5"):
+        maps.load(tmp_path)
+    (tmp_path / "melanin.exr").unlink()
+    Image.fromarray(np.full((2, 2), 70000, "i4")).save(tmp_path / "melanin.tif")
+    with pytest.raises(lutgen.InputError, match=r"melanin\.tif: holds integers of 32 bits"):
+        maps.load(tmp_path)
+
+
+def test_float_pictures_hold_values(tmp_path):
+    Image.fromarray(np.full((3, 5), 12.8, "f4")).save(tmp_path / "thickness.tif")
+    Image.fromarray(np.full((3, 5), 2.5, "f4")).save(tmp_path / "hemoglobin.tiff")
+    exr.write(tmp_path / "normal.exr", [exr.Part("map", exr.rgb(np.full((1, 7, 3), 0.5, "f4")), {})])
+    found = maps.load(tmp_path)
+    assert found.surface is not None
+    assert found.surface[0, 0, 3] == pytest.approx(0.4)
+    assert found.chromophores is not None
+    assert found.chromophores[2, 4, 2] == pytest.approx(2.5)
+    assert found.normal is not None
+    assert found.normal.shape == (1, 7, 3)
 
 
 def test_resizing_keeps_even_values_and_order():

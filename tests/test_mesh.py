@@ -1,5 +1,7 @@
 """Heads from files: what is read, what is guessed and said, and one line for what is not a mesh."""
 
+import hashlib
+
 import numpy as np
 import pytest
 import trimesh
@@ -91,6 +93,55 @@ def test_what_is_no_mesh_is_one_line(tmp_path):
     ball(1.0, uv=False).export(tmp_path / "head.glb")
     with pytest.raises(lutgen.InputError, match="mm_per_unit = 0"):
         mesh.load(tmp_path / "head.glb", mm_per_unit=0.0)
+
+
+def test_texture_coordinates_that_are_nan_are_said_and_left(tmp_path):
+    made = ball(1.0, uv=False)
+    lines = [f"v {x} {y} {z}\nvt nan nan" for x, y, z in made.vertices]
+    lines += ["f " + " ".join(f"{k + 1}/{k + 1}" for k in face) for face in made.faces]
+    (tmp_path / "head.obj").write_text("\n".join(lines))
+    found = mesh.load(tmp_path / "head.obj", 1.0)
+    assert found.uv is None
+    assert "has texture coordinates that are NaN: maps, pores" in found.notes[0]
+
+
+def test_v_can_be_turned_over(tmp_path):
+    ball(1.0).export(tmp_path / "head.glb")
+    one, two = (mesh.load(tmp_path / "head.glb", 1.0, flip_v=flip) for flip in (False, True))
+    assert one.uv is not None
+    assert two.uv is not None
+    assert two.uv[:, 1] == pytest.approx(1 - one.uv[:, 1])
+    assert np.array_equal(two.uv[:, 0], one.uv[:, 0])
+    again = mesh.of(str(tmp_path / "head.glb"), 1.0, flip_v=True).uv
+    assert again is not None
+    assert np.array_equal(again, two.uv)
+
+
+def test_a_file_that_is_a_known_scan_is_read_as_one(tmp_path, monkeypatch):
+    """Known by its content, whatever its name; pictures beside it count only if they are the scan's own."""
+    ball(1.0).export(tmp_path / "some.glb")
+    _red_above().save(tmp_path / "albedo.jpg")
+    marks = {name: hashlib.sha256((tmp_path / name).read_bytes()).hexdigest() for name in ("some.glb", "albedo.jpg")}
+    known = {
+        "mm_per_unit": 2.0, "flip_v": True, "attribution": "Somebody, CC-BY",
+        "files": {"head": ("x/Head.glb", marks["some.glb"]), "albedo": ("x/A.jpg", marks["albedo.jpg"]),
+                  "normal": ("x/N.jpg", "0" * 64)},
+    }  # fmt: skip
+    plain = mesh.load(tmp_path / "some.glb", 1.0)
+    monkeypatch.setattr(mesh, "SCANS", {"somebody": known})
+    found = mesh.of(str(tmp_path / "some.glb"))
+    assert found.attribution == "Somebody, CC-BY"
+    assert found.positions_mm == pytest.approx(2 * plain.positions_mm, rel=1e-5)
+    assert plain.uv is not None
+    assert found.uv is not None
+    assert found.uv[:, 1] == pytest.approx(1 - plain.uv[:, 1])
+    assert list(found.textures) == ["albedo"]
+    assert "normal map does not lie beside it (normal_tangent.jpg or N.jpg)" in found.notes[0]
+    assert mesh.of(str(tmp_path / "some.glb"), 3.0).positions_mm == pytest.approx(3 * plain.positions_mm, rel=1e-5)
+    (tmp_path / "albedo.jpg").write_bytes(b"another picture")
+    assert mesh.of(str(tmp_path / "some.glb")).textures == {}
+    ball(1.1).export(tmp_path / "other.glb")
+    assert mesh.of(str(tmp_path / "other.glb")).attribution == ""
 
 
 def test_a_scan_offline_says_so(monkeypatch):

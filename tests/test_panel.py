@@ -14,9 +14,8 @@ from lutgen.mesh import Mesh
 from lutgen.scene import Look
 from lutgen.tissue import Skin
 
-app, gl, overlay, panel, passes, picking = (
-    importlib.import_module(f"lutgen.viewer.{n}") for n in ("app", "gl", "overlay", "panel", "passes", "picking")
-)
+_NAMES = "app", "gl", "overlay", "panel", "passes", "picking", "stages"
+app, gl, overlay, panel, passes, picking, stages = (importlib.import_module(f"lutgen.viewer.{n}") for n in _NAMES)
 SIZE, HEIGHT = (96, 96), 700
 FACING = Look(azimuth=0, elevation=0, distance_mm=300, melanin=0.03, hemoglobin=0.01)
 
@@ -40,7 +39,7 @@ def stage(other):
     made = app.open_stage(lutgen.load(), square, Maps(), SIZE, other)
     app.picture(made, FACING)
     yield made
-    passes.release(made)
+    stages.release(made)
 
 
 class Hand:
@@ -180,7 +179,7 @@ def test_picking_knows_where_the_picture_is(stage):
     far = replace(look, distance_mm=5000)
     app.picture(made, far)
     assert picking.pick(made, far, 2, 2) is None
-    passes.release(made)
+    stages.release(made)
 
 
 def test_pick_and_picture_follow_the_oxygenation(stage):

@@ -20,11 +20,13 @@ LEVELS = [
     {"baking"},
     {"solvers"},
     {"painting"},
-    {"probing", "head", "maps"},
+    {"placing", "inversion"},
+    {"probing", "head", "maps", "environment"},
     {"folders", "manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
-    {"axes", "tissue", "color", "sculpt"},
+    {"axes", "tissue", "color", "sculpt", "hair", "pores", "surroundings", "cache", "hdr"},
     {"chromophores"},
+    {"extras"},
     {"progress", "errors"},
 ]
 HEAVY = {
@@ -75,6 +77,24 @@ def test_heavy_packages_have_one_room(package, allowed):
     assert users <= allowed
 
 
+def test_the_viewer_imports_nothing_that_bakes():
+    """Only what `lutgen/` has below its baking, no device and no pictures of other rooms (DESIGN)."""
+    above = set().union(*LEVELS[: level("baking") + 1], {"solvers", "device", "preview", "paper"})
+    for path in sorted((ROOT / "viewer").glob("*.py")):
+        names = {full.split(".")[1] for full, _ in imported(path) if full.split(".")[0] == "lutgen"}
+        assert not names & above, path.name
+
+
+def test_pictures_need_neither_opencl_nor_a_window():
+    pytest.importorskip("moderngl")
+    code = (
+        "import sys, importlib; [importlib.import_module(f'lutgen.viewer.{n}') for n in ('app', 'laws', 'timing')];"
+        "bad = {'pyopencl', 'colour', 'scipy', 'matplotlib', 'glfw', 'imgui_bundle', 'trimesh'} & set(sys.modules);"
+        "sys.exit(str(bad) if bad else 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_the_numpy_modules_import_neither_opencl_nor_colour():
     code = (
         "import sys, lutgen; luts = lutgen.load(); luts.color(.02, .7, .01); luts.profile(.02, .7, .01);"
@@ -95,15 +115,16 @@ def test_swatch_and_bake_do_not_import_colour(tmp_path):
 
 
 def test_modules_stay_short():
-    for path in [*(ROOT / "lutgen").rglob("*.py")]:
+    for path in [*(ROOT / "lutgen").rglob("*.py"), *(ROOT / "viewer").glob("*.py")]:
         assert len(path.read_text().splitlines()) <= 300, path.name
     for path in (ROOT / "kernels").glob("*.cl"):
         assert len(path.read_text().splitlines()) <= 200, path.name
 
 
 def test_public_functions_have_docstrings():
-    for path, _ in modules():
-        for node in ast.walk(ast.parse(path.read_text())):
+    for path in [*(path for path, _ in modules()), *(ROOT / "viewer").glob("*.py")]:
+        tree = ast.parse(path.read_text())
+        for node in tree.body if path.parent.name == "viewer" else ast.walk(tree):  # a window's callbacks have none
             if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_"):
                 assert ast.get_docstring(node), f"{path.name}: {node.name}"
 

@@ -1,12 +1,12 @@
 """The viewer's pictures: skin that follows the sliders, the same pixels every time, nothing left behind on the GPU."""
 
-import gc
 import importlib
 import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import gl_objects
 import numpy as np
 import pytest
 from PIL import Image
@@ -18,7 +18,8 @@ from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
-app, gl, passes, textures = (importlib.import_module(f"lutgen.viewer.{n}") for n in ("app", "gl", "passes", "textures"))
+_NAMES = "app", "gl", "passes", "stages", "textures"
+app, gl, passes, stages, textures = (importlib.import_module(f"lutgen.viewer.{n}") for n in _NAMES)
 SIZE = (160, 160)
 
 
@@ -27,7 +28,7 @@ def stage():
     shape = head.builtin()
     made = app.open_stage(lutgen.load(), shape, Maps(**painting.paint(shape)), SIZE)
     yield made
-    passes.release(made)
+    stages.release(made)
     gl.check()
 
 
@@ -39,7 +40,7 @@ def plain():
     square = Mesh(corners, normals, None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
     made = app.open_stage(lutgen.load(), square, Maps(), SIZE)
     yield made
-    passes.release(made)
+    stages.release(made)
 
 
 def face(stage, look) -> np.ndarray:
@@ -93,6 +94,19 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
     assert np.abs(found / expected - 1).max() < 0.005
 
 
+def test_a_painted_albedo_is_recolored():
+    """What `detail` adds is the ratio to the median in ACEScg, as `LutSet.recolor` has it; gray stays gray."""
+    luts, rng = lutgen.load(), np.random.default_rng(1)
+    albedo = luts.color(0.01 + 0.02 * rng.random((16, 16)), 0.7, 0.004 + 0.02 * rng.random((16, 16)))
+    acescg = lutgen.color.from_xyz(albedo @ np.linalg.inv(lutgen.color.SRGB_FROM_XYZ).T, "acescg")
+    expected = acescg / np.median(acescg, axis=(0, 1))
+    assert app.detail(albedo) == pytest.approx(expected, rel=1e-9)
+    gray = app.detail(np.repeat(0.2 + 0.6 * rng.random((8, 8, 1)), 3, axis=-1))
+    assert np.ptp(gray, axis=-1).max() < 1e-9
+    with pytest.raises(lutgen.InputError, match="albedo is black throughout"):
+        app.detail(np.zeros((4, 4, 3)))
+
+
 def test_thin_parts_let_light_through(plain):
     """Lit from behind, a thin sheet glows red and a thick one does not."""
     look = Look(environment=0, light=10, light_azimuth=180, light_elevation=0, azimuth=0, elevation=0, distance_mm=300)
@@ -100,21 +114,36 @@ def test_thin_parts_let_light_through(plain):
     for thickness in (1.0, 31.0):
         surface = np.ones((1, 1, 4), "f4")
         surface[..., 3] = thickness / 32
-        passes.set_map(plain, "surface", surface)
+        stages.set_map(plain, "surface", surface)
         seen.append(linear(plain, look)[160, 160])
-    passes.set_map(plain, "surface", None)
+    stages.set_map(plain, "surface", None)
     assert seen[0][0] > 5 * seen[0][2] > 0
     assert seen[1].max() < 0.01 * seen[0][0]
 
 
 def test_maps_change_the_skin_where_they_are(plain):
     base = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
-    passes.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
+    stages.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
     darker = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
-    passes.set_map(plain, "chromophores", None)
+    stages.set_map(plain, "chromophores", None)
     again = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
     assert np.all(darker[100:200, 100:200] < 0.9 * base[100:200, 100:200])
     assert np.array_equal(again, base)
+
+
+def test_maps_fade_on_skin_darker_than_they_were_painted_for(plain):
+    """By the power .38 of how much darker: a ratio of 4 at half of full contrast's melanin is 4^(2^-.38)."""
+    look = Look(melanin=0.04, azimuth=0, elevation=0, distance_mm=300, tier="off", transmission=0)
+    stages.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
+    made = {}
+    for full in (0.04, 0.02):
+        plain.full_contrast_melanin = full
+        linear(plain, look)
+        made[full] = gl.read(plain.targets["surface_buffer"], attachment=2)[160, 160, 0]
+    plain.full_contrast_melanin = 0.0292
+    stages.set_map(plain, "chromophores", None)
+    assert made[0.04] == pytest.approx(0.16, rel=2e-3)
+    assert made[0.02] == pytest.approx(0.04 * 4 ** (0.5**0.38), rel=2e-3)
 
 
 def test_oxygenation_reaches_the_textures_in_time(stage):
@@ -127,29 +156,55 @@ def test_oxygenation_reaches_the_textures_in_time(stage):
 
 
 def test_nothing_is_left_on_the_gpu():
-    """Objects of a stage that was opened, drawn, resized and released."""
+    """Objects of a stage that was opened, drawn, resized and released; queries are handed on, not made again."""
     shape, luts = head.builtin(), lutgen.load()
-
-    def alive() -> int:
-        gc.collect()
-        kinds = ("Texture", "Texture3D", "Buffer", "Program", "VertexArray", "Framebuffer", "Renderbuffer")
-        return sum(type(o).__name__ in kinds and type(o).__module__ == "moderngl" and not _released(o)
-                   for o in gc.get_objects())  # fmt: skip
-
-    gl.free()
-    before = alive()
+    before = gl_objects.alive()
     for _ in range(2):
         made = app.open_stage(luts, shape, Maps(), (32, 32))
         app.picture(made, Look(split="burley"))
-        passes.resize(made, (48, 16))
+        stages.resize(made, (48, 16))
         assert app.picture(made, Look()).shape == (16, 48, 3)
-        passes.release(made)
+        assert {kind for kind, _ in gl_objects.alive() - before} >= {*gl_objects.KINDS} - {"Query"}
+        stages.release(made)
+        assert gl_objects.alive() - before == set()
+
+
+@pytest.mark.parametrize("kind", gl_objects.KINDS)
+def test_a_lost_object_is_seen(kind):
+    """What the check after every test of the viewer would find: an object whose only reference went away."""
+    context, before = gl.context(), gl_objects.orphans()
+    kept = [context.program("#version 330\nvoid main() { gl_Position = vec4(0); }", "#version 330\nvoid main() {}")]
+    make = {
+        "Texture": lambda: gl.texture((2, 2)), "Buffer": lambda: context.buffer(reserve=4),
+        "Framebuffer": lambda: context.framebuffer([kept.append(gl.texture((2, 2))) or kept[-1]]),
+        "Program": lambda: context.program("#version 330\nvoid main() { gl_Position = vec4(1); }"),
+        "VertexArray": lambda: context.vertex_array(kept[0], []),
+        "Renderbuffer": lambda: context.renderbuffer((2, 2)), "Query": _begun_query,
+    }  # fmt: skip
+    thing = make[kind]()
+    assert gl_objects.orphans() == before
+    name = getattr(thing, "glo", 0)
+    del thing
+    lost = gl_objects.orphans() - before
+    assert {one for one, _ in lost} == {kind}
+    for one, number in lost:
+        assert name in (0, number)
+        gl_objects.delete(one, number)
+    gl.free(*kept)
+
+
+def test_a_pending_error_is_seen():
+    gl.context().enable_direct(0xBAD)
+    with pytest.raises(lutgen.MachineError, match="OpenGL: GL_INVALID_ENUM"):
+        gl.check()
     gl.check()
-    assert alive() == before
 
 
-def _released(thing) -> bool:
-    return type(thing.mglo).__name__ == "InvalidObject"
+def _begun_query():
+    query = gl.context().query(time=True)
+    with query:
+        pass
+    return query
 
 
 def test_screenshot_and_sheet_commands(tmp_path, capsys):
@@ -180,6 +235,9 @@ def test_screenshot_and_sheet_commands(tmp_path, capsys):
         (["--size", "wide"], 2, "for example 640x360"),
         (["--look", "none.toml"], 2, "look none.toml: cannot be read"),
         (["nowhere"], 2, "nowhere"),
+        (["--environment", "beach"], 2, "environment = beach: allowed is studio, none or a file ending in"),
+        (["--albedo", "paint"], 2, "albedo = 'paint': allowed is recolor, invert"),
+        (["--set", "environment_azimuth=200"], 2, "environment_azimuth = 200: allowed is -180 to 180"),
     ],
 )
 def test_bad_input_is_one_line(arguments, status, message, tmp_path, capsys, monkeypatch):
@@ -203,6 +261,47 @@ def test_a_set_of_another_version_is_one_line(tmp_path, capsys):
         assert "bake it anew" in error
         assert error.count("\n") == 1
     assert not (tmp_path / "out.png").exists()
+
+
+def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_path, monkeypatch):
+    pixel = np.full((1, 1, 3), 9, "u1")
+    square = Mesh(np.eye(4, 3, dtype="f4"), np.eye(4, 3, dtype="f4"), np.eye(4, 2, dtype="f4"), np.array([[0, 1, 2]]))
+    painted = {"chromophores": np.full((2, 2, 3), 2.0), "surface": np.full((2, 2, 4), 0.5), "normal": pixel}
+    monkeypatch.setattr(painting, "paint", lambda shape: dict(painted))
+    monkeypatch.setattr(painting, "notes", lambda shape: ("painted",))
+    monkeypatch.setattr(painting, "origin_mm", lambda shape: np.array([1.0, 2.0, 3.0]))
+    textures_given = {}
+    monkeypatch.setattr(app.mesh, "of", lambda *given: replace(square, textures=textures_given, notes=(str(given),)))
+    shape, found = app.model("a.glb", 2.0, None, True)
+    assert shape.notes == ("('a.glb', 2.0, True)", "painted")
+    assert np.array_equal(shape.positions_mm, np.eye(4, 3) - [1, 2, 3])
+    assert found.albedo is None
+    assert found.chromophores[0, 0, 0] == 2
+    textures_given |= {"albedo": np.full((1, 1, 3), 188, "u1"), "normal": pixel + 1}
+    _, found = app.model("a.glb", None, None)
+    assert found.chromophores is None  # it is in the albedo already
+    assert found.albedo[0, 0, 0] == pytest.approx(0.503, abs=1e-3)
+    assert found.normal[0, 0, 0] == 10
+    assert np.all(found.surface == 0.5)
+    Image.fromarray(np.full((1, 1), 255, "u1")).save(tmp_path / "occlusion.png")
+    Image.new("RGB", (1, 1), (128, 128, 255)).save(tmp_path / "normal.png")
+    _, found = app.model("a.glb", None, str(tmp_path))
+    assert found.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
+    assert found.normal[0, 0, 2] == 1
+    assert found.albedo is not None
+
+
+def test_a_head_without_texture_coordinates_is_drawn_and_said(tmp_path, capsys):
+    import trimesh
+
+    trimesh.creation.icosphere(2, 120).export(tmp_path / "ball.glb")
+    out = tmp_path / "out.png"
+    assert main(["view", "--screenshot", str(out), "--size", "64x48", "--mesh", str(tmp_path / "ball.glb"),
+                 "--albedo", "invert"]) == 0  # fmt: skip
+    said = capsys.readouterr().out
+    assert "ball.glb has no texture coordinates: maps, pores, freckles" in said
+    assert "no albedo to invert" in said
+    assert out.exists()
 
 
 def test_without_opengl_the_line_says_what_to_install(monkeypatch):

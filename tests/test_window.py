@@ -279,7 +279,7 @@ def test_what_the_mouse_does_to_a_look():
     assert window.turned(look, 0, 1000).elevation == 89
     assert window.relit(look, 0, -1000).light_elevation == 90
     assert window.zoomed(look, 100).distance_mm == scene.RANGES["distance_mm"][0]
-    facing = replace(look, azimuth=0, elevation=0)
+    facing = replace(look, azimuth=0, elevation=0, target_mm=(0, 0, 0))
     moved = window.panned(facing, 10, 0, 360)
     per_pixel = 2 * facing.distance_mm * np.tan(np.radians(facing.field_of_view / 2)) / 360
     assert moved.target_mm == pytest.approx((-10 * per_pixel, 0, 0))

@@ -13,6 +13,7 @@ import numpy as np
 from lutgen.errors import MachineError
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install -y libegl1 libgl1-mesa-dri"
+ANISOTROPY = 2.0
 _CONTEXTS: list[moderngl.Context] = []
 _DEFAULT: list[moderngl.Framebuffer] = []
 
@@ -95,6 +96,42 @@ def texture(size: tuple[int, int], components: int = 4, kind: str = "f2", data: 
     made.filter = (moderngl.NEAREST, moderngl.NEAREST)
     made.repeat_x = made.repeat_y = False
     return made
+
+
+def levels(pictures: list[np.ndarray]):
+    """A texture whose mip levels are given [rows, columns, 3], each half the size of the one before; wraps along x."""
+    made = context().texture(pictures[0].shape[1::-1], 3, dtype="f2")
+    made.build_mipmaps(0, len(pictures) - 1)
+    for level, picture in enumerate(pictures):
+        made.write(np.minimum(picture, 65504).astype("f2").tobytes(), level=level, alignment=1)
+    made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    made.repeat_x, made.repeat_y = True, False
+    return made
+
+
+def table(values: np.ndarray) -> moderngl.Texture:
+    """A float texture of an array [rows, columns, channels], read linearly between texel centers."""
+    made = texture(values.shape[1::-1], values.shape[2], "f4", np.ascontiguousarray(values, "f4").tobytes())
+    made.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    return made
+
+
+def image(values: np.ndarray, anisotropy: float = ANISOTROPY) -> moderngl.Texture:
+    """A filtered texture of an array [rows, columns, channels], 0 to 1 in 8 bits or floats."""
+    if values.ndim == 2:
+        values = values[..., None]
+    kind = "f1" if values.dtype == np.uint8 else "f2"
+    data = np.ascontiguousarray(values if kind == "f1" else values.astype("f2"))
+    made = context().texture(data.shape[1::-1], data.shape[2], data.tobytes(), alignment=1, dtype=kind)
+    return filtered(made, anisotropy)
+
+
+def filtered(texture: moderngl.Texture, anisotropy: float = ANISOTROPY) -> moderngl.Texture:
+    """A texture read with mip levels, and sharp where it is seen aslant."""
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.anisotropy = anisotropy
+    return texture
 
 
 def volume(values: np.ndarray):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 REFRACTIVE_INDEX = 1.4
 STUDIO = (  # direction, sharpness, color times strength
-    ((0.45, 0.55, 0.70), 14.0, (3.20, 3.10, 2.94)),
-    ((-0.85, 0.25, 0.45), 10.0, (0.83, 0.96, 1.10)),
-    ((0.30, 0.35, -0.90), 20.0, (2.50, 2.38, 2.25)),
+    ((-0.55, 0.60, 0.58), 14.0, (3.00, 2.90, 2.75)),
+    ((0.90, 0.20, 0.40), 10.0, (0.78, 0.80, 0.82)),
+    ((0.62, 0.30, -0.72), 28.0, (3.20, 3.10, 3.00)),
 )
 """Soft boxes: exp(sharpness (cos - 1)) lobes, linear ACEScg."""
 _GROUND, _SKY = np.array([0.088, 0.083, 0.080]), np.array([0.29, 0.31, 0.335])
@@ -38,7 +40,8 @@ def constants() -> str:
         f"const float STUDIO_SHARPNESS[{count}] = float[]({', '.join(f'{s:.1f}' for _, s, _ in STUDIO)});",
         f"const vec3 STUDIO_DIRECTION[{count}] = vec3[]({vectors(ways)});",
         f"const vec3 STUDIO_COLOR[{count}] = vec3[]({vectors(c for _, _, c in STUDIO)});",
-        f"const float EXIT_MEAN = {exit_mean():.9g};",
+        f"const int EXIT_MEANS = {len(exit_means())};",
+        f"const float EXIT_MEAN[EXIT_MEANS] = float[]({', '.join(f'{m:.9g}' for m in exit_means())});",
     ])  # fmt: skip
 
 
@@ -50,15 +53,30 @@ def fibonacci(count: int) -> np.ndarray:
     return np.stack([r * np.cos(turn), y, r * np.sin(turn)], axis=1)
 
 
-def irradiance_sh(directions: np.ndarray, radiance: np.ndarray) -> np.ndarray:
-    """Cosine-convolved harmonics [9, 3] of radiance [N, 3] evenly spread (Ramamoorthi & Hanrahan 2001)."""
+def irradiance_sh(directions: np.ndarray, radiance: np.ndarray, angles: np.ndarray | None = None) -> np.ndarray:
+    """Cosine-convolved harmonics [9, 3] of radiance [N, 3] (Ramamoorthi & Hanrahan 2001).
+
+    `angles` [N]: solid angle of each direction; without it they are evenly spread.
+    """
+    angles = np.full(len(directions), 4 * np.pi / len(directions)) if angles is None else angles
     x, y, z = directions.T
     basis = np.stack([
         0.282095 + 0 * x, 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
         0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y),
     ])  # fmt: skip
     bands = np.array([np.pi] + [2 * np.pi / 3] * 3 + [np.pi / 4] * 5)
-    return bands[:, None] * (basis @ radiance) * (4 * np.pi / len(directions))
+    return bands[:, None] * ((basis * angles) @ radiance)
+
+
+def studio_irradiance() -> np.ndarray:
+    """Cosine-convolved harmonics [9, 3] of the studio."""
+    directions = fibonacci(4096)
+    return irradiance_sh(directions, studio(directions))
+
+
+def studio_mean() -> float:
+    """Mean radiance of the studio over all directions and channels."""
+    return float(studio(fibonacci(4096)).mean())
 
 
 def fresnel(cosine: np.ndarray) -> np.ndarray:
@@ -74,40 +92,53 @@ def exit_mean() -> float:
     return float(((1 - fresnel(c)) * c * w).sum())
 
 
+def exit_means() -> np.ndarray:
+    """The same for rough skin, by roughness evenly from 0 to 1 [32]: mean of what one GGX lobe does not reflect."""
+    table = ggx_albedo()
+    whole, part = table[..., 0], table[..., 1]
+    f0 = fresnel(np.ones(1))
+    kept = (f0 * (whole - part) + part) * (1 + f0 * (1 / np.maximum(whole, 1e-6) - 1))
+    root = np.linspace(0, 1, table.shape[1])
+    return np.trapezoid((1 - kept) * 4 * root**3, root, axis=1)
+
+
 def entry_of_the_sky() -> float:
     """What an even sky enters with, relative to light along the normal."""
     return exit_mean() / float(1 - fresnel(np.ones(1))[0])
 
 
-def ggx_albedo(size: int = 32, samples: int = 48) -> np.ndarray:
+@cache
+def ggx_albedo(size: int = 64, radial: int = 96, turns: int = 32) -> np.ndarray:
     """Directional albedo [roughness, root of cosine, 2] of one GGX lobe: at F = 1, and weighted with (1 - v.h)^5.
 
-    Height-correlated Smith masking, visible normals drawn on a regular grid (Heitz 2018): weights G2 / G1 <= 1.
+    Height-correlated Smith masking; visible normals (Heitz 2018) on a regular grid, weights G2 / G1 <= 1. Half a turn
+    is enough, the other is its mirror image. Radii are dense at the rim, where the facets lean and masking sets in: of
+    an even grid, a smooth lobe's whole tail lies in the last cell. Nodes are right to 1e-4; between them, for lobes of
+    roughness .08 to 1, an energy divided by the table's is off by -0.3 to +0.11 % (32 nodes: -1.5 to +0.5).
     """
-    u, v = np.stack(np.meshgrid(*2 * [(np.arange(samples) + 0.5) / samples])).reshape(2, -1)
-    r, turn = np.sqrt(u), 2 * np.pi * v
-    table = np.zeros((size, size, 2))
-    for i, roughness in enumerate(np.linspace(0, 1, size)):
-        alpha = max(roughness, 0.02) ** 2
-        for j, c in enumerate(np.linspace(0, 1, size) ** 2):  # close at grazing, where it is steep
-            nv = max(c, 1e-3)
-            view = np.array([np.sqrt(1 - nv * nv), 0.0, nv])
-            seen = view * [alpha, alpha, 1.0]
-            seen /= np.linalg.norm(seen)
-            across = np.array([0.0, 1.0, 0.0])
-            along = np.cross(seen, across)
-            s = 0.5 * (1 + seen[2])
-            x = r * np.cos(turn)
-            y = (1 - s) * np.sqrt(1 - x * x) + s * r * np.sin(turn)
-            half = x[:, None] * across + y[:, None] * along + np.sqrt(np.maximum(1 - x * x - y * y, 0))[:, None] * seen
-            half = half * [alpha, alpha, 1.0]
-            half /= np.linalg.norm(half, axis=1, keepdims=True)
-            vh = half @ view
-            nl = 2 * vh * half[:, 2] - nv
-            masked, shadowed = (_smith(k, alpha) for k in (np.array(nv), np.maximum(nl, 1e-6)))
-            weight = np.where(nl > 0, (1 + masked) / (1 + masked + shadowed), 0)
-            table[i, j] = weight.mean(), (weight * (1 - np.clip(vh, 0, 1)) ** 5).mean()
-    return table
+    cosines = np.maximum(np.linspace(0, 1, size) ** 2, 1e-3)  # close at grazing, where it is steep
+    return np.stack([_lobe(cosines, roughness, radial, turns) for roughness in np.linspace(0, 1, size)])
+
+
+def _lobe(cosines: np.ndarray, roughness: float, radial: int, turns: int) -> np.ndarray:
+    """Both albedos [N, 2] of a lobe seen at cosines [N]."""
+    alpha, c = max(roughness, 0.02) ** 2, cosines[:, None, None]
+    t = (np.arange(radial) + 0.5) / radial
+    r = np.sqrt(1 - (1 - t) ** 3)[:, None]
+    share = ((1 - t) ** 2 / ((1 - t) ** 2).sum())[:, None] / turns
+    turn = np.pi * ((np.arange(turns) + 0.5) / turns - 0.5)
+    x, z = alpha * np.sqrt(1 - c * c), c  # the view where the facets' ellipsoid is a sphere
+    x, z = x / np.hypot(x, z), z / np.hypot(x, z)
+    across, s = r * np.cos(turn), (1 + z) / 2
+    along = (1 - s) * np.sqrt(1 - across**2) + s * r * np.sin(turn)
+    up = np.sqrt(np.maximum(1 - across**2 - along**2, 0))
+    half = np.stack(np.broadcast_arrays(alpha * (up * x - along * z), alpha * across, along * x + up * z))
+    half /= np.sqrt((half**2).sum(axis=0))
+    vh = half[0] * np.sqrt(1 - c * c) + half[2] * c
+    nl = 2 * vh * half[2] - c
+    masked, shadowed = _smith(c, alpha), _smith(np.maximum(nl, 1e-6), alpha)
+    weight = share * np.where(nl > 0, (1 + masked) / (1 + masked + shadowed), 0)
+    return np.stack([weight.sum(axis=(1, 2)), (weight * (1 - np.clip(vh, 0, 1)) ** 5).sum(axis=(1, 2))], axis=1)
 
 
 def _smith(cosine: np.ndarray, alpha: float) -> np.ndarray:

@@ -15,14 +15,16 @@ from lutgen.errors import InputError, MachineError
 from lutgen.scene import Look
 from lutgen.tissue import PRESETS
 
-from .passes import TAPS, Stage
+from .passes import TAPS
 from .picking import Picked
+from .stages import Stage
 
 WIDTH, _PICK_WIDTH = 300, 260
 SLIDERS = (
     ("melanin", "%.4f"), ("eumelanin", "%.2f"), ("hemoglobin", "%.4f"), ("oxygenation", "%.2f"), (None, ""),
     ("light", "%.2f"), ("light_azimuth", "%.0f"), ("light_elevation", "%.0f"), ("light_size", "%.1f"),
-    ("environment", "%.2f"), (None, ""), ("roughness", "%.2f"), ("specular", "%.2f"), ("bumps", "%.2f"),
+    ("environment", "%.2f"), ("environment_azimuth", "%.0f"), (None, ""),
+    ("roughness", "%.2f"), ("specular", "%.2f"), ("bumps", "%.2f"),
     ("transmission", "%.2f"), ("exposure", "%.2f"),
 )  # fmt: skip
 """Values of a look that have a slider, and how each is shown."""

@@ -2,150 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
 
 import moderngl
 import numpy as np
 
-from lutgen import color, scene
-from lutgen.errors import InputError, in_range
-from lutgen.lutset import LutSet
+from lutgen import color, environment, pores, scene
+from lutgen.errors import in_range
 from lutgen.scene import Look
 
-from . import gl, light, textures
+from . import clock, gl, light, sides, stages
+from .stages import SAMPLES, Stage
 
 TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
 REFERENCE_FRAMES = 16
-SHADOW_SIZE = 1024
-SAMPLES = 2
-"""Pixels shaded along x and y for one shown."""
-_MAPS = ("normal", "chromophores", "surface", "detail")
-_PLAIN = {"normal": (0.5, 0.5, 1.0, 1.0), "chromophores": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0),
-          "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
-"""What stands for a map that is not given: no bumps, the sliders' skin, no occlusion, too thick for light."""
-_LIGHT_SKIN = (0.0127, 0.7, 0.0077)
-
-
-@dataclass
-class Side:
-    """A LUT set as it is stored, as it is shown (at the look's oxygenation), on the GPU, and the pass that reads it."""
-
-    luts: LutSet
-    shown: LutSet
-    textures: textures.LutTextures
-    gather: gl.Pass
-
-
-@dataclass
-class Stage:
-    """Everything on the GPU: programs, head, maps, LUT sets by `Look.split`, targets of one size."""
-
-    size: tuple[int, int]
-    sides: dict[str, Side]
-    surface: moderngl.Program
-    shadow: moderngl.Program
-    compose: gl.Pass
-    head: moderngl.VertexArray
-    head_shadow: moderngl.VertexArray
-    buffers: tuple
-    center_mm: np.ndarray
-    radius_mm: float
-    maps: dict
-    environment: np.ndarray
-    environment_map: moderngl.Texture
-    ggx: moderngl.Texture
-    targets: dict = field(default_factory=dict)
-    oxygenation: float | None = None
-    milliseconds: dict[str, float] = field(default_factory=dict)
-
-
-def open_stage(
-    mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int, int], other: LutSet | None = None
-) -> Stage:
-    """Upload a head (positions_mm, normals, uv, triangles), its maps [rows, columns, channels], a LUT set, another."""
-    context = gl.context()
-    constants = {"constants.glsl": light.constants()}
-    surface = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", constants))
-    shadow = context.program(gl.splice("shadow.vert.glsl"), gl.splice("shadow.frag.glsl"))
-    uv = mesh.uv if mesh.uv is not None else np.zeros((len(mesh.positions_mm), 2))
-    vertices = np.concatenate([mesh.positions_mm, mesh.normals, uv], axis=1).astype("f4")
-    buffer = context.buffer(vertices.tobytes())
-    indices = context.buffer(np.ascontiguousarray(mesh.triangles, "i4").tobytes())
-    head = context.vertex_array(surface, [(buffer, "3f 3f 2f", "position", "normal", "uv")], indices)
-    cast = context.vertex_array(shadow, [(buffer, "3f 20x", "position")], indices)
-    center = (mesh.positions_mm.max(axis=0) + mesh.positions_mm.min(axis=0)) / 2
-    directions = light.fibonacci(4096)
-    albedo = light.ggx_albedo().astype("f4")
-    ggx = gl.texture((albedo.shape[1], albedo.shape[0]), 2, "f4", np.ascontiguousarray(albedo).tobytes())
-    ggx.filter = (moderngl.LINEAR, moderngl.LINEAR)
-    sides = {"none": _side(luts, textures.upload(luts))}
-    if other is not None:
-        sides["set"] = _side(other, textures.upload(other))
-    stage = Stage(
-        size, sides, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
-        float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
-        {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS},
-        light.irradiance_sh(directions, light.studio(directions)), gl.texture((1, 1), 4, "f4"), ggx,
-    )  # fmt: skip
-    resize(stage, size)
-    return stage
-
-
-def _side(luts: LutSet, uploaded: textures.LutTextures) -> Side:
-    made = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
-    return Side(luts, luts, uploaded, gl.full_screen("gather.frag.glsl", made))
-
-
-def side(stage: Stage, split: str) -> Side:
-    """What shades a side of a split view; InputError where another LUT set is asked for and none was given."""
-    if split == "burley" and split not in stage.sides:
-        plain = stage.sides["none"]
-        rings, within = textures.burley_tables(plain.luts, _LIGHT_SKIN)
-        tables = replace(plain.textures, rings=gl.volume(rings), encircled=gl.volume(within))
-        stage.sides[split] = replace(plain, textures=tables)
-    if split == "set" and split not in stage.sides:
-        raise InputError("split = set: there is no other LUT set; give one with --compare DIR")
-    return stage.sides["none" if split == "scattering" else split]
-
-
-def _map(values: np.ndarray | None, plain: tuple[float, ...]) -> moderngl.Texture:
-    """A filtered texture of a map in 0 to 1 (8-bit) or of floats; of one plain texel where there is none."""
-    values = np.array([[plain]], "f4") if values is None else values
-    if values.ndim == 2:
-        values = values[..., None]
-    kind = "f1" if values.dtype == np.uint8 else "f2"
-    data = np.ascontiguousarray(values if kind == "f1" else values.astype("f2"))
-    made = gl.context().texture((data.shape[1], data.shape[0]), data.shape[2], data.tobytes(), alignment=1, dtype=kind)
-    made.build_mipmaps()
-    made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    made.anisotropy = 8.0
-    return made
-
-
-def set_map(stage: Stage, name: str, values: np.ndarray | None) -> None:
-    """Exchange one of the head's maps."""
-    stage.maps[name].release()
-    stage.maps[name] = _map(values, _PLAIN[name])
-
-
-def resize(stage: Stage, size: tuple[int, int]) -> None:
-    """Make the targets of a frame of that size in pixels."""
-    gl.free(*stage.targets.values())
-    context, large = gl.context(), (size[0] * SAMPLES, size[1] * SAMPLES)
-    names = "entering", "facing", "skin", "reflected", "detail"
-    layers = {name: gl.texture(large, 4, "f4" if name in ("entering", "skin") else "f2") for name in names}
-    depth = context.depth_renderbuffer(large)
-    cast = context.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
-    cast.compare_func = ""
-    cast.repeat_x = cast.repeat_y = False
-    scattered, pixels = gl.texture(large, 4, "f4"), gl.texture(size, 4, "f1")
-    stage.targets = layers | {
-        "depth": depth, "cast": cast, "scattered": scattered, "pixels": pixels,
-        "surface_buffer": context.framebuffer(list(layers.values()), depth),
-        "shadow_buffer": context.framebuffer(depth_attachment=cast),
-        "scattered_buffer": context.framebuffer([scattered]), "pixel_buffer": context.framebuffer([pixels]),
-    }  # fmt: skip
-    stage.size = size
 
 
 def set_oxygenation(stage: Stage, oxygenation: float) -> None:
@@ -154,16 +24,14 @@ def set_oxygenation(stage: Stage, oxygenation: float) -> None:
         return
     for name in ("none", "set"):
         if name in stage.sides:
-            one = stage.sides[name]
-            one.shown = one.luts if oxygenation == one.luts.oxygenation else one.luts.expand(oxygenation=oxygenation)
-            textures.rewrite(one.textures, *textures.tables(one.shown))
+            sides.expand(stage.sides[name], oxygenation)
     stage.oxygenation = oxygenation
 
 
 def require(stage: Stage, look: Look) -> None:
     """Raise InputError where the stage cannot show a look: chromophores outside the LUTs' axes, no LUT set to split."""
     for name in {"none", look.split} & {"none", "set"}:
-        grid = side(stage, name).luts.color_lut.grid
+        grid = stages.side(stage, name).luts.color_lut.grid
         for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin):
             in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
 
@@ -180,17 +48,26 @@ def draw(stage: Stage, look: Look, frame: int | None = None) -> None:
     """
     require(stage, look)
     camera = scene.camera(look, *stage.size)
+    clock.start(stage.timer)
     if not frame:
         set_oxygenation(stage, look.oxygenation)
-        _shadow(stage, look)
-        _surface(stage, look, camera)
+        with clock.timed(stage.timer, "shadow"):
+            cast_shadow(stage, look)
+        with clock.timed(stage.timer, "surface"):
+            draw_surface(stage, look, camera, stage.surface, stage.head, stage.targets["surface_buffer"])
+    with clock.timed(stage.timer, "scattering"):
+        _halves(stage, look, camera, range(frames(look)) if frame is None else (frame,))
+    with clock.timed(stage.timer, "composition"):
+        compose(stage, "scattered", "reflected", 2.0**look.exposure)
+    gl.check()
+
+
+def _halves(stage: Stage, look: Look, camera: scene.Camera, added: Iterable[int]) -> None:
     width, height = (n * SAMPLES for n in stage.size)
     halves = [(0, width)] if look.split == "none" else [(0, width // 2), (width // 2, width)]
     for k, (left, right) in enumerate(halves):
-        for one in range(frames(look)) if frame is None else (frame,):
+        for one in added:
             _scatter(stage, look, camera, look.split if k else "none", (left, 0, right - left, height), one)
-    _compose(stage, look)
-    gl.check()
 
 
 def _light_clip(stage: Stage, look: Look) -> np.ndarray:
@@ -201,38 +78,60 @@ def _light_clip(stage: Stage, look: Look) -> np.ndarray:
     return box @ scene.look_at(stage.center_mm + 2 * radius * way, stage.center_mm)
 
 
-def _shadow(stage: Stage, look: Look) -> None:
+def cast_shadow(stage: Stage, look: Look) -> None:
+    """The depth of the head as the light sees it, drawn again where the light has moved since (`stage.cast`)."""
+    clip = _light_clip(stage, look)
+    if stage.cast is not None and np.array_equal(stage.cast, clip):
+        return
+    stage.cast = clip
     buffer = stage.targets["shadow_buffer"]
     buffer.use()
     buffer.clear(depth=1.0)
     gl.context().enable_only(moderngl.DEPTH_TEST)
-    gl.put(stage.shadow, light_clip=_light_clip(stage, look))
+    gl.put(stage.shadow, light_clip=clip)
     stage.head_shadow.render()
 
 
-def _surface(stage: Stage, look: Look, camera: scene.Camera) -> None:
-    program, buffer = stage.surface, stage.targets["surface_buffer"]
+def skin_of(stage: Stage, look: Look) -> dict:
+    """Uniforms that say what the look's skin is, and how far the maps change it."""
+    grid = stage.sides["none"].luts.color_lut.grid
+    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    fade = min(stage.full_contrast_melanin / look.melanin, 1.0)  # freckles and blotches show less on darker skin
+    return {
+        "chromophores": (look.melanin, look.eumelanin, look.hemoglobin), "contrast": (fade**0.38, fade**0.15),
+        "chromophores_low": tuple(a.low for a in axes), "chromophores_high": tuple(a.high for a in axes),
+    }  # fmt: skip
+
+
+def draw_surface(
+    stage: Stage, look: Look, camera: scene.Camera, program: moderngl.Program, seen: moderngl.VertexArray,
+    buffer: moderngl.Framebuffer, **more: moderngl.Texture,
+) -> None:  # fmt: skip
+    """Draw the head with a surface program into its buffer; `more` textures are its own."""
     buffer.use()
     buffer.clear(0.0, 0.0, 0.0, 0.0)
     gl.context().enable_only(moderngl.DEPTH_TEST)
+    gl.context().depth_func = "<="
+    clip = camera.projection @ camera.view
+    gl.put(stage.shadow, light_clip=clip)
+    stage.head_shadow.render()  # depth alone first: then no pixel is shaded twice
+    around = stage.environment_map
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
-            surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], shadow_map=stage.targets["cast"],
-            environment_map=stage.environment_map, ggx_albedo=stage.ggx)  # fmt: skip
-    grid = stage.sides["none"].luts.color_lut.grid
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
-    fade = min(0.0292 / max(look.melanin, 0.0292), 1.0)  # freckles and blotches show less on darker skin
+            surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], pore_map=stage.maps["pores"],
+            shadow_map=stage.targets["cast"], environment_map=stage.ggx if around is None else around,
+            ggx_albedo=stage.ggx, **more)  # fmt: skip
     gl.put(
-        program, view=camera.view, projection=camera.projection, light_clip=_light_clip(stage, look),
-        shadow_offset_mm=0.6,
+        program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
+        shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
         light_direction=scene.light_direction(look), light_color=look.light * SUN, eye=camera.eye_mm,
-        chromophores=(look.melanin, look.eumelanin, look.hemoglobin), contrast=(fade**0.38, fade**0.15),
-        chromophores_low=tuple(a.low for a in axes), chromophores_high=tuple(a.high for a in axes),
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
-        environment_entry=light.entry_of_the_sky(), environment_levels=0, environment=look.environment,
-        irradiance_sh=stage.environment,
+        environment_entry=light.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
+        environment_levels=0 if around is None else environment.LEVELS,
+        environment_turn=tuple(f(np.radians(look.environment_azimuth)) for f in (np.cos, np.sin)),
+        **skin_of(stage, look),
     )  # fmt: skip
-    stage.head.render()
+    seen.render()
 
 
 SUN = np.array([1.0, 0.965, 0.9])
@@ -242,7 +141,7 @@ SUN = np.array([1.0, 0.965, 0.9])
 def _scatter(
     stage: Stage, look: Look, camera: scene.Camera, split: str, scissor: tuple[int, int, int, int], frame: int
 ) -> None:
-    one, targets, buffer = side(stage, split), stage.targets, stage.targets["scattered_buffer"]
+    one, targets, buffer = stages.side(stage, split), stage.targets, stage.targets["scattered_buffer"]
     program, tables = one.gather.program, one.textures
     context = gl.context()
     context.enable_only(moderngl.BLEND if frame else moderngl.NOTHING)
@@ -259,12 +158,13 @@ def _scatter(
     buffer.scissor = None
 
 
-def _compose(stage: Stage, look: Look) -> None:
+def compose(stage: Stage, scattered: str, reflected: str, exposure: float) -> None:
+    """The sum of two of the stage's targets as display colors."""
     program, buffer = stage.compose.program, stage.targets["pixel_buffer"]
     gl.context().enable_only(moderngl.NOTHING)
     buffer.use()
-    gl.bind(program, scattered=stage.targets["scattered"], reflected_light=stage.targets["reflected"])
-    gl.put(program, srgb_from_acescg=color.from_acescg(np.eye(3), "srgb").T, exposure=2.0**look.exposure,
+    gl.bind(program, scattered=stage.targets[scattered], reflected_light=stage.targets[reflected])
+    gl.put(program, srgb_from_acescg=color.from_acescg(np.eye(3), "srgb").T, exposure=exposure,
            samples=SAMPLES)  # fmt: skip
     stage.compose.array.render()
 
@@ -272,15 +172,3 @@ def _compose(stage: Stage, look: Look) -> None:
 def pixels(stage: Stage) -> np.ndarray:
     """The frame as 8-bit sRGB [height, width, 3], first row on top."""
     return gl.read(stage.targets["pixel_buffer"], kind="f1", components=3)[::-1]
-
-
-def release(stage: Stage) -> None:
-    """Free everything that the stage holds on the GPU."""
-    sides = stage.sides.values()
-    volumes = {id(t): t for one in sides for t in (one.textures.color, one.textures.rings, one.textures.encircled)}
-    laws = {id(law): law for law in (stage.compose, *(one.gather for one in sides))}
-    gl.free(
-        *stage.targets.values(), *stage.maps.values(), *volumes.values(), stage.environment_map, stage.ggx, stage.head,
-        stage.head_shadow, stage.surface, stage.shadow, *stage.buffers,
-        *(part for law in laws.values() for part in (law.array, law.program, law.corners)),
-    )  # fmt: skip

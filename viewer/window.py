@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import glfw
@@ -12,13 +13,10 @@ from imgui_bundle import imgui
 
 from lutgen import scene
 from lutgen.errors import InputError, MachineError
-from lutgen.lutset import LutSet
-from lutgen.maps import Maps
-from lutgen.mesh import Mesh
 from lutgen.scene import Look
 from lutgen.tissue import PRESETS
 
-from . import app, gl, overlay, panel, passes, picking
+from . import app, gl, overlay, panel, passes, picking, stages
 
 KEYS = {
     glfw.KEY_BACKSPACE: imgui.Key.backspace, glfw.KEY_DELETE: imgui.Key.delete, glfw.KEY_ENTER: imgui.Key.enter,
@@ -37,7 +35,7 @@ class State:
 
     look: Look
     start: Look
-    stage: passes.Stage
+    stage: stages.Stage
     notes: tuple[str, ...]
     panel: panel.Panel = field(default_factory=panel.Panel)
     mouse: tuple[float, float] = (0.0, 0.0)
@@ -48,12 +46,11 @@ class State:
 
 
 def run(
-    luts: LutSet, shape: Mesh, given: Maps, look: Look, size: tuple[int, int], other: LutSet | None = None,
-    notes: tuple[str, ...] = (),
-) -> Look:  # fmt: skip
+    opened: Callable[[tuple[int, int]], stages.Stage], look: Look, size: tuple[int, int], notes: tuple[str, ...] = ()
+) -> Look:
     """Open a window whose picture has that size, until it is closed; the look at its end.
 
-    Raises MachineError where there is no display or no OpenGL 3.3.
+    `opened` makes the stage of a size in pixels. Raises MachineError where there is no display or no OpenGL 3.3.
     """
     window = _open((size[0] + panel.WIDTH, size[1]))
     try:
@@ -61,7 +58,7 @@ def run(
             gl.adopt(moderngl.create_context(require=330))
         except Exception as error:  # moderngl raises plain Exception
             raise MachineError(f"no OpenGL 3.3 ({' '.join(str(error).split())}); {gl.INSTALL_HINT}") from error
-        state = State(look, look, app.open_stage(luts, shape, given, size, other), notes)
+        state = State(look, look, opened(size), notes)
         drawer, copy = overlay.open_overlay(), gl.full_screen("copy.frag.glsl")
         _listen(window, state)
         since = time.perf_counter()
@@ -73,7 +70,7 @@ def run(
             since = now
             glfw.swap_buffers(window)
         overlay.close(drawer)
-        passes.release(state.stage)
+        stages.release(state.stage)
         gl.free(copy.array, copy.program, copy.corners)
         gl.check()
         return state.look
@@ -124,7 +121,7 @@ def _frame(window, state: State, drawer: overlay.Overlay, copy: gl.Pass, seconds
                              lambda path: app.write(passes.pixels(state.stage), path))  # fmt: skip
     state.awake = AWAKE if state.look != before else max(state.awake - 1, 0)
     if state.stage.size != size:
-        passes.resize(state.stage, size)
+        stages.resize(state.stage, size)
         state.drawn = None
     if state.drawn != state.look:
         try:

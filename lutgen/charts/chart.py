@@ -1,18 +1,18 @@
-"""`lutgen chart`: speed against accuracy, in color, in profiles, by setting and by walk."""
+"""`lutgen chart`: speed against accuracy, in color, in profiles, by setting, by walk and in the viewer."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
-from lutgen.charts import drawing, settings, shapes, speed, walks
+from lutgen.charts import drawing, settings, shapes, speed, viewing, walks
 
 
 def draw(out: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> dict[str, str]:
     """Draw every chart into the folder `out`, which appears whole or not at all; what each shows, by its name.
 
     `quick` takes fewer photons, seeds and skins. Raises InputError where `out` holds something, MachineError without
-    matplotlib or OpenCL.
+    matplotlib or OpenCL; without OpenGL one chart is left out, and its line says why.
     """
     with drawing.folder(out) as folder:
         shown = {"speed-accuracy": speed.speed(folder, quick, progress)}
@@ -21,4 +21,5 @@ def draw(out: Path, quick: bool = False, progress: Callable = lambda stage, tall
         shown["settings"] = settings.settings(folder, quick)
         progress("walks", None)
         shown["walks"] = walks.walks(folder, quick)
+        shown["viewing"] = viewing.viewing(folder, quick, progress)
     return shown

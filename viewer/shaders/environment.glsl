@@ -2,6 +2,7 @@
 uniform sampler2D environment_map;
 uniform int environment_levels;   // mip levels of environment_map; 0: the studio
 uniform float environment;        // gain
+uniform vec2 environment_turn;    // cosine and sine of the angle that the surroundings are turned by, from +z toward +x
 uniform vec3 irradiance_sh[9];    // cosine-convolved harmonics of the same light, order 2
 
 vec3 studio(vec3 d, float roughness) {
@@ -13,14 +14,21 @@ vec3 studio(vec3 d, float roughness) {
     return light;
 }
 
+// A direction as the surroundings have it before they are turned.
+vec3 unturned(vec3 d) {
+    return vec3(d.x * environment_turn.x - d.z * environment_turn.y, d.y, d.x * environment_turn.y + d.z * environment_turn.x);
+}
+
 vec3 reflected(vec3 d, float roughness) {
+    d = unturned(d);
     if (environment_levels == 0) return environment * studio(d, roughness);
     vec2 at = vec2(atan(d.x, -d.z) / 6.28318531 + 0.5, acos(clamp(d.y, -1.0, 1.0)) / 3.14159265);
-    return environment * textureLod(environment_map, at, sqrt(roughness) * float(environment_levels - 3)).rgb;
+    return environment * textureLod(environment_map, at, sqrt(roughness) * float(environment_levels - 1)).rgb;
 }
 
 // Irradiance from the hemisphere around n (Ramamoorthi & Hanrahan 2001).
 vec3 irradiance(vec3 n) {
+    n = unturned(n);
     vec3 e = irradiance_sh[0] * 0.282095 + 0.488603 * (irradiance_sh[1] * n.y + irradiance_sh[2] * n.z + irradiance_sh[3] * n.x)
         + 1.092548 * (irradiance_sh[4] * n.x * n.y + irradiance_sh[5] * n.y * n.z + irradiance_sh[7] * n.x * n.z)
         + irradiance_sh[6] * 0.315392 * (3.0 * n.z * n.z - 1.0)

@@ -20,6 +20,10 @@ uniform int frame;            // another rotation and phase each
 in vec2 screen;
 layout(location = 0) out vec4 scattered;    // radiance, a: 1 where there is skin; sums over frames
 
+// A profile whose r99 is less, in pixels, needs no taps: what they change stays below 1/255 after the display's curve,
+// beside black and at three times white; at half a pixel they change up to 18/255 there.
+const float LEAST_FOOTPRINT = 0.25;
+
 const mat2 GOLDEN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
 
 float bayer(ivec2 p) {
@@ -67,7 +71,7 @@ void main() {
     if (here.a <= 0.0) return;
     vec4 own = texelFetch(skin, pixel, 0), place = profile_place(own.rgb);
     float footprint = encircled(1.0, place).a * focal / here.a;  // r99 in pixels
-    int count = taps == 0 || footprint < 0.5 ? 0 : clamp(int(ceil(4.0 * footprint)), min(8, taps), taps);
+    int count = taps == 0 || footprint < LEAST_FOOTPRINT ? 0 : clamp(int(ceil(4.0 * footprint)), min(8, taps), taps);
     vec3 light = count == 0 ? here.rgb : gathered(pixel, here, place, count);
     // What comes through a thin part from its far side: all light that travels farther than the part is thick.
     light += sun * texelFetch(behind, pixel, 0).a * (1.0 - encircled(own.a, place).rgb) * step(own.a, 31.9);

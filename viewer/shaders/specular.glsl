@@ -14,23 +14,23 @@ vec2 lobe_albedo(float c, float roughness) {
     return texture(ggx_albedo, (vec2(sqrt(c), roughness) * (size - 1.0) + 0.5) / size).xy;
 }
 
-// Microfacet lobe times cosine, for Fresnel reflectance f.
-float ggx(vec3 n, vec3 v, vec3 l, float roughness, float f) {
+// Microfacet lobe times cosine, for Fresnel reflectance f. What is put back was reflected once more, by facets that
+// stand at all angles to the light: f0, as environment_lobe has it, not f, which near grazing is far larger.
+float ggx(vec3 n, vec3 v, vec3 l, float roughness, float f, float f0) {
     vec3 h = normalize(v + l);
     float nl = max(dot(n, l), 0.0), nv = max(dot(n, v), 1e-3), nh = max(dot(n, h), 0.0);
     float a2 = pow(roughness, 4.0), d = nh * nh * (a2 - 1.0) + 1.0;
     float visible = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2) + 1e-6);
     float single = a2 / (3.14159265 * d * d) * visible * nl * f;
-    return single * (1.0 + f * (1.0 / lobe_albedo(nv, roughness).x - 1.0));
+    return single * (1.0 + f0 * (1.0 / lobe_albedo(nv, roughness).x - 1.0));
 }
 
-float specular_lobes(vec3 n, vec3 v, vec3 l, float roughness) {
+float specular_lobes(vec3 n, vec3 v, vec3 l, float roughness, float second) {
     float f = fresnel(max(dot(v, normalize(v + l)), 0.0));
-    return mix(ggx(n, v, l, roughness, f), ggx(n, v, l, roughness * SECOND_LOBE, f), SECOND_WEIGHT);
+    return mix(ggx(n, v, l, roughness, f, F0), ggx(n, v, l, second, f, F0), SECOND_WEIGHT);
 }
 
 // What an even environment reflects: split-sum of one lobe (Karis 2013), the lost energy put back.
-float environment_lobe(float nv, float roughness) {
-    vec2 e = lobe_albedo(nv, roughness);
-    return (F0 * (e.x - e.y) + e.y) * (1.0 + F0 * (1.0 / e.x - 1.0));
+float environment_lobe(vec2 albedo) {
+    return (F0 * (albedo.x - albedo.y) + albedo.y) * (1.0 + F0 * (1.0 / albedo.x - 1.0));
 }

@@ -1,0 +1,42 @@
+"""What takes seconds to make, kept in the user's cache under the hash of what it was made from."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+
+def folder() -> Path:
+    """Where made things are kept: LUTGEN_CACHE, else the user's cache folder."""
+    given = os.environ.get("LUTGEN_CACHE")
+    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
+    return Path(given) if given else Path(base) / "lutgen"
+
+
+def kept(
+    name: str, modules: tuple[str, ...], make: Callable[[], dict[str, np.ndarray]], *arrays: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Arrays by name that `make` gives, from the cache where the sources of `modules` and `arrays` are the same.
+
+    A cache that is damaged or cannot be written costs only time.
+    """
+    mark = hashlib.sha256("".join((files("lutgen") / f"{module}.py").read_text() for module in modules).encode())
+    for array in arrays:
+        mark.update(f"{array.shape}{array.dtype}".encode() + np.ascontiguousarray(array).tobytes())
+    path = folder() / f"{name}-{mark.hexdigest()[:16]}.npz"
+    with contextlib.suppress(Exception), np.load(path) as found:  # any damage: make it again
+        return {key: found[key] for key in found.files}
+    made: dict = make()
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez(file, **made)
+        partial.replace(path)
+    return made

@@ -1,0 +1,18 @@
+"""Packages that only some commands need: imported there, or a line that says what to install."""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+from lutgen.errors import MachineError
+
+
+def viewer(module: str) -> ModuleType:
+    """A module of the viewer, which needs packages that a bake does not; MachineError where one is missing."""
+    try:
+        return importlib.import_module(f"lutgen.viewer.{module}")
+    except ImportError as error:
+        if (error.name or "").startswith("lutgen"):
+            raise
+        raise MachineError(f'the viewer needs {error.name}, which is missing: pip install "lutgen[view]"') from error
