@@ -1,11 +1,10 @@
 """What every export has, and what real readers of .cube and OpenEXR make of it."""
 
+import importlib
 import json
 from dataclasses import replace
 
 import numpy as np
-import OpenImageIO
-import PyOpenColorIO
 import pytest
 
 import lutgen
@@ -14,6 +13,8 @@ from lutgen.axes import Axis
 from lutgen.cli import main
 from lutgen.exports import source as sources
 from lutgen.lutset import ColorLut
+
+PyOpenColorIO, OpenImageIO = (importlib.import_module(name) for name in ("PyOpenColorIO", "OpenImageIO"))
 
 
 @pytest.fixture(scope="module")

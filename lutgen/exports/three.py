@@ -85,11 +85,11 @@ def page(source: Source, written: dict[str, bytes]) -> str:
     template = files("lutgen.exports").joinpath("templates")
     shape = head.builtin()
     painted = painting.paint(shape)
-    arrays, facts = _mesh(shape)
+    arrays, facts = _mesh(shape, painted["surface"][..., 2])
     packed = {COLOR: written[COLOR], PROFILE: written[PROFILE], **arrays}
     data = {
         "packed": {name: _text(zlib.compress(content, 9)) for name, content in packed.items()},
-        "pictures": {"pigments": _text(_pigments(painted)), "bumps": _text(_jpeg(painted["normal"]))},
+        "pictures": {"pigments": _text(_pigments(painted)), "bumps": _text(_jpeg(painted["normal"][::2, ::2, :3]))},
         "mesh": facts, "axes": {name: _axis(getattr(source.grid, name)) for name in AXES},
         "presets": {preset.name: preset.skin for preset in source.presets},
         "swatches": {preset.name: _eight_bit(preset.linear_srgb) for preset in source.presets},
@@ -110,15 +110,18 @@ def _axis(axis: Axis) -> dict:
     return {"low": axis.low, "high": axis.high, "exponent": axis.exponent}
 
 
-def _mesh(shape) -> tuple[dict[str, bytes], dict]:
-    """The head's arrays, one number after the other and as differences, which pack to a third; how to undo that."""
-    kept = head.made()
+def _mesh(shape, open_sky: np.ndarray) -> tuple[dict[str, bytes], dict]:
+    """The head's arrays, one number after the other and as differences, which pack to a third; how to undo that.
+
+    `open_sky` [rows, columns] is the map that each vertex takes its share of the sky from.
+    """
     p, n = np.asarray(shape.positions_mm, float), np.asarray(shape.normals, float)
     low, span = p.min(axis=0), np.ptp(p, axis=0)
     positions = np.round((p - low) / span * 65535).astype("u2")
     corners = np.round(np.asarray(shape.uv, float) * 65535).astype("u2")
     facing = np.round(n * 127).astype("i1")
-    sky = np.round(255 * np.clip(kept["open"], 0, 1)).astype("u1")
+    u, v = np.minimum((shape.uv * open_sky.shape).astype(int).T, open_sky.shape[0] - 1)
+    sky = np.round(255 * np.clip(open_sky[v, u].astype(float), 0, 1)).astype("u1")
     index = shape.triangles.astype("u2").ravel()  # the head has fewer than 65,536 vertices
     order = {"positions": positions, "corners": corners, "facing": facing, "sky": sky[:, None], "index": index[:, None]}
     arrays = {name: np.diff(values, axis=0, prepend=values.dtype.type(0)).T.tobytes() for name, values in order.items()}
@@ -127,7 +130,7 @@ def _mesh(shape) -> tuple[dict[str, bytes], dict]:
 
 def _pigments(painted: dict) -> bytes:
     """Ratios of melanin and hemoglobin as maps hold them, and half the ratio of roughness, in one picture."""
-    ratios, surface = painted["chromophores"], painted["surface"]
+    ratios, surface = (painted[name][::2, ::2].astype(float) for name in ("chromophores", "surface"))
     rough = np.round(np.clip(surface[..., 0] / maps.SURFACE_RANGE, 0, 1) * 255).astype("u1")
     return _jpeg(np.stack([maps.encode_ratio(ratios[..., 0]), maps.encode_ratio(ratios[..., 2]), rough], axis=-1))
 
