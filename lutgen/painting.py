@@ -16,7 +16,7 @@ from lutgen import cache, complexion, placing, surroundings
 from lutgen.mesh import Mesh
 
 MAP_SIZE = 2048
-_MODULES = ("painting", "placing", "surroundings", "complexion", "hair", "sculpt", "head")
+_MODULES = ("painting", "placing", "landmarks", "surroundings", "complexion", "hair", "sculpt", "head")
 _NO_FACE_MM = np.array([0.0, 1000.0, -1000.0])
 
 

@@ -24,7 +24,7 @@ LEVELS = [
     {"probing", "head", "maps", "environment"},
     {"folders", "manifest", "preview", "paper", "device", "exr", "lutset", "expansion"},
     {"config", "scene", "glsl", "mesh", "complexion", "paths", "profiles", "quadrature", "burley"},
-    {"axes", "tissue", "color", "sculpt", "hair", "pores", "surroundings", "cache", "hdr"},
+    {"axes", "tissue", "color", "sculpt", "hair", "pores", "surroundings", "cache", "hdr", "landmarks"},
     {"chromophores"},
     {"extras"},
     {"progress", "errors"},
