@@ -91,9 +91,9 @@ def hand(stage):
 def test_every_slider_moves_its_value_and_no_other(hand, name):
     left, top, _, bottom = hand.panel.places[name]
     before, y = asdict(hand.look), (top + bottom) / 2
-    hand.press(left + 70, y, to=(left + 190, y))
+    hand.press(left + 60, y, to=(left + 190, y))
     high = getattr(hand.look, name)
-    hand.press(left + 70, y, to=(left - 5, y))
+    hand.press(left + 60, y, to=(left - 5, y))
     assert getattr(hand.look, name) == pytest.approx(scene.RANGES[name][0])
     assert high == pytest.approx(scene.RANGES[name][1])
     assert asdict(hand.look) | {name: 0} == before | {name: 0}

@@ -105,7 +105,7 @@ class Screen:
     def slide(self, name: str, share: float) -> float:
         """Drag a slider from its middle to a share of its length; the value where it comes to rest."""
         left, top, right, bottom = self.frames[-1]["places"][name]
-        right = min(right, left + panel.WIDTH / 2)  # its name stands beside it
+        right = min(right, left + panel.SLIDER)  # its name stands beside it
         start, end = (left + 0.5 * (right - left), left + share * (right - left))
         self.drag((start, (top + bottom) / 2), (end, (top + bottom) / 2))
         self.rest()

@@ -19,7 +19,7 @@ from .passes import TAPS
 from .picking import Picked
 from .stages import Stage
 
-WIDTH, _PICK_WIDTH = 300, 260
+WIDTH, SLIDER, _PICK_WIDTH = 300, 126, 260
 SLIDERS = (
     ("melanin", "%.4f"), ("eumelanin", "%.2f"), ("hemoglobin", "%.4f"), ("oxygenation", "%.2f"), (None, ""),
     ("light", "%.2f"), ("light_azimuth", "%.0f"), ("light_elevation", "%.0f"), ("light_size", "%.1f"),
@@ -117,7 +117,7 @@ def _presets(look: Look) -> Look:
 
 
 def _sliders(panel: Panel, look: Look) -> Look:
-    imgui.push_item_width(0.5 * WIDTH)
+    imgui.push_item_width(SLIDER)
     for name, shown in SLIDERS:
         if name is None:
             imgui.separator()
