@@ -55,6 +55,31 @@ def test_opencolorio_reads_the_cube(folder, source):
     assert off >= 0.5 * stated  # stated is what is measured, not a guess above it
 
 
+def read_by_oiio(path) -> np.ndarray:
+    image = OpenImageIO.ImageInput.open(str(path))
+    assert image is not None, OpenImageIO.geterror()
+    pixels = image.read_image("float")
+    image.close()
+    return pixels
+
+
+def test_openimageio_reads_every_picture_of_every_target(tmp_path, source):
+    out = tmp_path / "all"
+    assert main(["export", "--to", "all", "--out", str(out)]) == 0
+    pictures = sorted([*out.rglob("*.exr"), *out.rglob("*.png")])
+    assert {path.parent.name for path in pictures} == {"exr", "unreal", "unity", "godot", "preintegrated"}
+    for path in pictures:
+        assert np.all(np.isfinite(read_by_oiio(path))), path
+    N_h, N_e, N_m = source.grid.shape
+    color = source.luts.color(*source.skins.T)
+    for target, name in (("unreal", "T_LutgenColor.exr"), ("godot", "skin_color.exr"), ("unity", "lutgen_color.exr")):
+        tiles = read_by_oiio(out / target / name)[..., :3]
+        tiles = tiles[::-1] if target == "unity" else tiles  # Unity counts rows from the bottom
+        cells = tiles.reshape(N_e, N_h, N_m, 3).transpose(1, 0, 2, 3)
+        off = np.abs(sources.trilinear(cells, source.coordinates(source.skins)) - color).max()
+        assert off <= added(out)[target]["color"]["largest"] + 1e-6
+
+
 def test_openimageio_reads_the_strips(folder, source):
     for name, space in (("color_rec709.exr", "srgb"), ("color_acescg.exr", "acescg")):
         image = OpenImageIO.ImageInput.open(str(folder / "exr" / name))

@@ -13,6 +13,7 @@ import numpy as np
 
 from lutgen import exr
 from lutgen.exports import shader
+from lutgen.exports.editors import slices
 from lutgen.exports.source import AXES, MADE, MEANING, Preset, Report, Source, difference, trilinear, warps
 
 COLOR, PROFILE, SHADER, SCENE = "skin_color.exr", "skin_profile.exr", "skin.gdshader", "skin.tscn"
@@ -30,7 +31,7 @@ def write(source: Source, folder: Path) -> Report:
     N_h, N_e, N_m = source.grid.shape
     half = source.own_colors("srgb").astype("f2")
     note = {"axes": warps(source.grid), "space": "linear Rec. 709"}
-    exr.write(folder / COLOR, [exr.Part("color", exr.rgb(strip(half)), note)], exr.REC709)
+    exr.write(folder / COLOR, [exr.Part("color", exr.rgb(slices(half)), note)], exr.REC709)
     table = shader.profile_texels(source)
     channels = {name: np.ascontiguousarray(table[..., k].astype("f2")) for k, name in enumerate("RGBA")}
     exr.write(folder / PROFILE, [exr.Part("profile", channels, {"axes": warps(source.luts.profile_lut.grid)})])
@@ -60,11 +61,6 @@ def write(source: Source, folder: Path) -> Report:
         f"{error['profile']['largest']:.2g} at most.",
         MADE,
     ), error)  # fmt: skip
-
-
-def strip(cells: np.ndarray) -> np.ndarray:
-    """An image [N_e, N_h N_m, 3] of cells [N_h, N_e, N_m, 3]: a tile a slice along z, as the importer cuts it."""
-    return cells.transpose(1, 0, 2, 3).reshape(cells.shape[1], -1, cells.shape[-1])
 
 
 def sidecar(importer: str, kind: str, parameters: dict) -> str:
