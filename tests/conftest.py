@@ -7,6 +7,7 @@ import pytest
 
 import lutgen
 from lutgen import config, manifest
+from lutgen.exports.source import Source
 
 
 @pytest.fixture(scope="session")
@@ -19,6 +20,12 @@ def draft():
 def draft_dir(draft, tmp_path_factory):
     """The same set on disk."""
     return manifest.save(draft, tmp_path_factory.mktemp("luts") / "draft")
+
+
+@pytest.fixture(scope="session")
+def source():
+    """What exports of the default set start from."""
+    return Source(lutgen.load(), 31)
 
 
 def _gl(module):

@@ -32,11 +32,6 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def source():
-    return sources.Source(lutgen.load(), 31)
-
-
-@pytest.fixture(scope="module")
 def asymmetric():
     """A set whose Rec. 709 colors say which node they are: (0.1 + m / 8, 0.1 + e / 4, 0.1 + h / 16)."""
     luts = lutgen.load()

@@ -12,7 +12,6 @@ import pytest
 from browser import WEB, node
 from PIL import Image
 
-import lutgen
 from lutgen import color, exports
 from lutgen.axes import Axis
 from lutgen.exports import godot, shader
@@ -48,11 +47,6 @@ void fragment() {
 """
 RADIUS_MM, SCALE = 8.0, "vec4(8.0, 1.0, 1.0, 1.0)"
 """What a packed radius of 1 stands for."""
-
-
-@pytest.fixture(scope="module")
-def source():
-    return sources.Source(lutgen.load(), 31)
 
 
 @pytest.fixture(scope="module")

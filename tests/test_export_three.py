@@ -9,7 +9,6 @@ import pytest
 from browser import node
 from PIL import Image
 
-import lutgen
 from lutgen import color
 from lutgen.cli import main
 from lutgen.exports import shader
@@ -17,11 +16,6 @@ from lutgen.exports import source as sources
 
 HALF = 2.0**-11
 """Largest relative rounding of a half float."""
-
-
-@pytest.fixture(scope="module")
-def source():
-    return sources.Source(lutgen.load(), 31)
 
 
 @pytest.fixture(scope="module")

@@ -5,17 +5,10 @@ import importlib
 import numpy as np
 import pytest
 
-import lutgen
 from lutgen import burley, exr
 from lutgen.exports import openpbr, preintegrated
-from lutgen.exports.source import Source
 
 MaterialX = importlib.import_module("MaterialX")
-
-
-@pytest.fixture(scope="module")
-def source():
-    return Source(lutgen.load(), 31)
 
 
 def test_materialx_validates_the_document(tmp_path, source):

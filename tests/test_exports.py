@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import lutgen
 from lutgen import exports
 from lutgen.axes import Axis
 from lutgen.cli import main
@@ -22,11 +21,6 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("exports") / "all"
     assert main(["export", "--to", "cube,exr", "--out", str(out)]) == 0
     return out
-
-
-@pytest.fixture(scope="module")
-def source():
-    return sources.Source(lutgen.load(), 31)
 
 
 def added(folder) -> dict:
