@@ -91,7 +91,7 @@ def load(path: Path, mm_per_unit: float | None = None, flip_v: bool = False) -> 
         notes.append(note)
     uv, lack = _coordinates(whole)
     if uv is None:
-        notes.append(f"{path.name} {lack}: maps, pores, freckles, occlusion and thickness are left out; unwrap it")
+        notes.append(f"{path.name} {lack}: maps, freckles, occlusion and thickness are left out; unwrap it")
     elif flip_v:
         uv[:, 1] = 1 - uv[:, 1]
     positions = (positions - (low + high) / 2) * mm_per_unit

@@ -33,7 +33,7 @@ def notes(shape: Mesh) -> tuple[str, ...]:
     """What could not be painted on a head, for its user."""
     lack = "" if shape.uv is None else _lack(shape)
     if lack:
-        return (f"texture coordinates {lack}: pores, freckles, occlusion and thickness are left out; unwrap the mesh",)
+        return (f"texture coordinates {lack}: freckles, occlusion and thickness are left out; unwrap the mesh",)
     made = _painted(shape)
     if "face" in made and not made["face"]:
         return (
