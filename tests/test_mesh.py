@@ -102,7 +102,7 @@ def test_texture_coordinates_that_are_nan_are_said_and_left(tmp_path):
     (tmp_path / "head.obj").write_text("\n".join(lines))
     found = mesh.load(tmp_path / "head.obj", 1.0)
     assert found.uv is None
-    assert "has texture coordinates that are NaN: maps, pores" in found.notes[0]
+    assert "has texture coordinates that are NaN: maps, freckles" in found.notes[0]
 
 
 def test_v_can_be_turned_over(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -22,7 +23,8 @@ def context() -> moderngl.Context:
     """The process's OpenGL context, made without a window at the first call; MachineError where there is no OpenGL."""
     if not _CONTEXTS:
         try:
-            _CONTEXTS.append(moderngl.create_context(standalone=True, require=330, backend="egl"))
+            backend = {"backend": "egl"} if sys.platform.startswith("linux") else {}  # elsewhere the system's own
+            _CONTEXTS.append(moderngl.create_context(standalone=True, require=330, **backend))
         except Exception as error:  # moderngl and its loaders raise plain Exception
             raise MachineError(f"no OpenGL 3.3 ({' '.join(str(error).split())}); {INSTALL_HINT}") from error
     return _CONTEXTS[0]
