@@ -6,6 +6,10 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
+
+from lutgen.exports import shader
+
 WEB = Path(__file__).parent / "web"
 
 
@@ -31,3 +35,13 @@ def _install() -> None:
     flags = "--no-package-lock --ignore-scripts --legacy-peer-deps --no-audit --no-fund --loglevel=error"
     done = subprocess.run(["npm", "install", *flags.split()], cwd=WEB, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr[-4000:]
+
+
+def rings(source, quantiles: np.ndarray) -> np.ndarray:
+    """Radius in mm and encircled energy R, G, B [N, 4] that a shader must read at quantiles [N] of `source.skins`."""
+    lut = source.luts.profile_lut
+    table = lut.grid.interpolate(shader.profile_texels(source).reshape(*lut.grid.shape, 64, 4), *source.skins.T)
+    column = np.clip(64 * quantiles - 0.5, 0, 63)
+    first = np.minimum(column.astype(int), 62)
+    rows, along = np.arange(len(table)), (column - first)[:, None]
+    return (1 - along) * table[rows, first] + along * table[rows, first + 1]

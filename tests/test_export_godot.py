@@ -9,7 +9,7 @@ from dataclasses import replace
 import godot_pack
 import numpy as np
 import pytest
-from browser import WEB, node
+from browser import WEB, node, rings
 from PIL import Image
 
 from lutgen import color, exports
@@ -162,12 +162,7 @@ def test_godot_samples_what_the_luts_say(ran, source):
 
 
 def test_godots_rings_are_the_profiles(ran, source, quantiles):
-    lut = source.luts.profile_lut
-    table = lut.grid.interpolate(shader.profile_texels(source).reshape(*lut.grid.shape, 64, 4), *source.skins.T)
-    column = np.clip(64 * quantiles - 0.5, 0, 63)
-    first = np.minimum(column.astype(int), 62)
-    rows, along = np.arange(len(table)), (column - first)[:, None]
-    expected = (1 - along) * table[rows, first] + along * table[rows, first + 1]
+    expected = rings(source, quantiles)
     found = unpacked(ran, "ring") * [RADIUS_MM, 1, 1, 1]
     assert np.all(np.abs(found - expected) <= HALF * expected + 5e-6)
 

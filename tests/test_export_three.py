@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from browser import node
+from browser import node, rings
 from PIL import Image
 
 from lutgen import color
@@ -108,14 +108,9 @@ def test_three_js_samples_what_the_luts_say(read, source):
 def test_the_glsl_reads_rings(read, source):
     """`lutgen_ring` mixes the table's nodes and columns; the widest channel's energy is the quantile that was asked."""
     found, quantiles = values(read, "ring"), read[1]
-    lut = source.luts.profile_lut
-    table = lut.grid.interpolate(shader.profile_texels(source).reshape(*lut.grid.shape, 64, 4), *source.skins.T)
-    column = np.clip(64 * quantiles - 0.5, 0, 63)
-    first = np.minimum(column.astype(int), 62)
-    rows, along = np.arange(len(found)), (column - first)[:, None]
-    expected = (1 - along) * table[rows, first] + along * table[rows, first + 1]
+    expected = rings(source, quantiles)
     assert np.all(np.abs(found - expected) <= HALF * expected + 5e-6)
-    assert found[:, 1:].min(axis=1) == pytest.approx((column + 0.5) / 64, abs=1e-5)
+    assert found[:, 1:].min(axis=1) == pytest.approx(np.clip(quantiles, 0.5 / 64, 63.5 / 64), abs=1e-5)
 
 
 @pytest.fixture(scope="module")

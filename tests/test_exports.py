@@ -125,6 +125,7 @@ def test_a_fixed_axis_becomes_a_cube_too(tmp_path, source):
         (["--to", "cube", "nowhere"], "nowhere"),
         (["--to", "cube", "--out", "here"], "here: exists; give another folder, or --force"),
         (["--to", "cube", "--out", "no/where"], "there is no folder"),
+        (["--to", "cube", "--out", "/proc/out"], "cannot be written"),
     ],
 )
 def test_bad_input_is_one_line(arguments, message, tmp_path, capsys, monkeypatch):

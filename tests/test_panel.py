@@ -139,6 +139,21 @@ def test_looks_are_saved_loaded_and_errors_said(hand, tmp_path, monkeypatch):
     assert "nowhere" in hand.panel.said
 
 
+def test_the_panel_says_what_a_frame_costs(hand, monkeypatch):
+    said = []
+    for name in ("text", "text_wrapped"):
+        monkeypatch.setattr(panel.imgui, name, said.append)
+    hand.look = replace(hand.look, tier="high")
+    hand.frame()
+    told = "; ".join(said)
+    for name, spent in hand.stage.milliseconds.items():
+        assert spent > 0
+        assert f"{name} {spent:.1f}" in told
+    assert list(hand.stage.milliseconds) == ["shadow", "surface", "scattering", "composition"]
+    assert f"at most 64 taps a pixel; LUTs {hand.stage.sides['none'].textures.bytes / 1e6:.2f} MB" in told
+    assert "a note" in said
+
+
 def test_preset_buttons_set_the_skin(hand, monkeypatch):
     real = panel.imgui.small_button
     monkeypatch.setattr(panel.imgui, "small_button", lambda label: real(label) or label == "dark")
