@@ -33,7 +33,7 @@ def _parser() -> argparse.ArgumentParser:
     bake.add_argument("--wavelengths", help="6, 8, 12, 10nm or 5nm")
     bake.add_argument("--seed", type=int, help="seed of the random streams")
     bake.add_argument("--force", action="store_true", help="replace an existing LUT set")
-    bake.set_defaults(run="lutgen.commands.bake")
+    bake.set_defaults(run="lutgen.commands.sets.bake")
 
     swatch = commands.add_parser("swatch", help="color and spectrum of one skin")
     swatch.add_argument("--preset", help="very-light, light, intermediate, tan, brown, dark, source-caucasian, …")
@@ -50,35 +50,35 @@ def _parser() -> argparse.ArgumentParser:
     swatch.add_argument("--photons", type=int, default=100_000, help="per wavelength, for Monte Carlo")
     swatch.add_argument("--seed", type=int, default=0)
     swatch.add_argument("--png", metavar="FILE", help="write a picture of the color")
-    swatch.set_defaults(run="lutgen.commands.swatch")
+    swatch.set_defaults(run="lutgen.commands.skin.swatch")
 
     info = commands.add_parser("info", help="what a LUT set holds")
     info.add_argument("dir", metavar="DIR")
-    info.set_defaults(run="lutgen.commands.info")
+    info.set_defaults(run="lutgen.commands.sets.info")
 
     devices = commands.add_parser("devices", help="the OpenCL devices, best first")
-    devices.set_defaults(run="lutgen.commands.devices")
+    devices.set_defaults(run="lutgen.commands.machine.devices")
 
     check = commands.add_parser("check", help="verify a LUT set: files, axes, laws, 100 nodes against adding-doubling")
     check.add_argument("dir", metavar="DIR")
-    check.set_defaults(run="lutgen.commands.check")
+    check.set_defaults(run="lutgen.commands.sets.check")
 
     bench = commands.add_parser("bench", help="speed of the trace, and time and error of a bake by stage")
     bench.add_argument("--viewer", action="store_true", help="instead: milliseconds of a frame by pass and tier")
     bench.add_argument("--size", default=None, help="with --viewer: pixels (default: 640x360)")
-    bench.set_defaults(run="lutgen.commands.bench")
+    bench.set_defaults(run="lutgen.commands.machine.bench")
 
     figures = commands.add_parser("figures", help="the source document's results as charts and tables")
     figures.add_argument("--out", required=True, metavar="DIR", help="folder to make")
-    figures.set_defaults(run="lutgen.commands.figures")
+    figures.set_defaults(run="lutgen.commands.charts.figures")
 
     chart = commands.add_parser("chart", help="speed against accuracy of every method and setting, as charts")
     stability = commands.add_parser("stability", help="where each method errs beyond its promise, as maps and a table")
     for command in (chart, stability):
         command.add_argument("--out", required=True, metavar="DIR", help="folder to make")
         command.add_argument("--quick", action="store_true", help="in under a minute: fewer photons, coarser maps")
-    chart.set_defaults(run="lutgen.commands.chart")
-    stability.set_defaults(run="lutgen.commands.stability")
+    chart.set_defaults(run="lutgen.commands.charts.chart")
+    stability.set_defaults(run="lutgen.commands.charts.stability")
 
     view = commands.add_parser("view", help="a window with a face shaded from a LUT set, or a picture of it")
     sheet = commands.add_parser("sheet", help="a picture of every preset on a head")
@@ -99,9 +99,9 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one value of the look")
         command.add_argument("--size", default=None, help="pixels: 640x360")
     view.add_argument("--screenshot", metavar="FILE", help="picture to write instead of opening a window")
-    view.set_defaults(run="lutgen.commands.view")
+    view.set_defaults(run="lutgen.commands.pictures.view")
     sheet.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
-    sheet.set_defaults(run="lutgen.commands.sheet")
+    sheet.set_defaults(run="lutgen.commands.pictures.sheet")
 
     export = commands.add_parser("export", help="a LUT set in the form that engines open")
     export.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
@@ -111,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--out", required=True, metavar="DIR", help="folder to make, with one folder a target")
     export.add_argument("--size", type=int, help="nodes along each axis of a cube (default: 31 for the default set)")
     export.add_argument("--force", action="store_true", help="replace an existing folder")
-    export.set_defaults(run="lutgen.commands.export")
+    export.set_defaults(run="lutgen.commands.sets.export")
 
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")

@@ -15,7 +15,8 @@ import lutgen
 ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"cli"},
-    {"commands", "benchmark", "checking", "showing"},
+    {"commands"},
+    {"benchmark", "checking"},
     {"charts", "exports"},
     {"baking"},
     {"solvers"},

@@ -12,10 +12,10 @@ from types import ModuleType
 
 import lutgen
 from lutgen import extras, manifest, scene
+from lutgen.commands import Outcome
 from lutgen.errors import InputError, one_of
 from lutgen.scene import Look
 
-Outcome = tuple[dict, str, int]
 SHEET_SIZE = "480x480"
 PICTURE_SIZE = "1280x720"
 TIMED_SIZE = "640x360"
