@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lutgen.baking import bake
     from lutgen.config import Recipe
     from lutgen.errors import InputError, MachineError
+    from lutgen.fitting import Fit, fit
     from lutgen.lutset import LutSet
     from lutgen.manifest import save
     from lutgen.profiles import Profile
@@ -26,6 +27,7 @@ _WHERE = {
     "baking": ("bake",),
     "config": ("Recipe",),
     "errors": ("InputError", "MachineError"),
+    "fitting": ("Fit", "fit"),
     "lutset": ("LutSet",),
     "manifest": ("save",),
     "profiles": ("Profile",),
@@ -36,9 +38,9 @@ _WHERE = {
 _MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}
 
 __all__ = [
-    "PRESETS", "Axis", "Grid", "InputError", "Layer", "LutSet", "MachineError", "Profile", "Recipe", "Reflectance",
-    "Skin", "bake", "default_luts", "layers", "linear_srgb", "load", "preset", "profile", "reflectance", "save",
-    "spectrum",
+    "PRESETS", "Axis", "Fit", "Grid", "InputError", "Layer", "LutSet", "MachineError", "Profile", "Recipe",
+    "Reflectance", "Skin", "bake", "default_luts", "fit", "layers", "linear_srgb", "load", "preset", "profile",
+    "reflectance", "save", "spectrum",
 ]  # fmt: skip
 
 

@@ -11,6 +11,10 @@ import sys
 from lutgen import errors
 
 DEFAULT_OUT = "lutgen-luts"
+_SPECTRUM = "wavelength_nm and reflectance (0 to 1), 380 to 780 nm"
+_COLOR = (
+    "'#rrggbb' (quoted), srgb:r,g,b (0 to 1, encoded), linear:r,g,b (linear sRGB), lab:L,a,b or xyz:X,Y,Z, under D65"
+)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -37,12 +41,6 @@ def _parser() -> argparse.ArgumentParser:
 
     swatch = commands.add_parser("swatch", help="color and spectrum of one skin")
     swatch.add_argument("--preset", help="very-light, light, intermediate, tan, brown, dark, source-caucasian, …")
-    for name in ("melanin", "eumelanin", "hemoglobin", "oxygenation", "epidermis-mm"):
-        swatch.add_argument(f"--{name}", type=float)
-    swatch.add_argument("--scattering", help="source, bashkatov, jacques, saidi or donner")
-    swatch.add_argument("--saidi-a-per-mm", type=float, help="Saidi's fitted A (default: 5.7)")
-    swatch.add_argument("--saidi-b-nm4-per-mm", type=float, help="Saidi's fitted B (default: 8.4e10)")
-    swatch.add_argument("--reading", help="reduced, similarity or literal")
     swatch.add_argument("--pipeline", default="default", help="default or source")
     swatch.add_argument(
         "--method", default="adding-doubling", help="adding-doubling, path-table, direct, dipole or multipole"
@@ -51,6 +49,36 @@ def _parser() -> argparse.ArgumentParser:
     swatch.add_argument("--seed", type=int, default=0)
     swatch.add_argument("--png", metavar="FILE", help="write a picture of the color")
     swatch.set_defaults(run="lutgen.commands.skin.swatch")
+
+    fit = commands.add_parser(
+        "fit", help="melanin, hemoglobin, ... of a measured spectrum or color, with uncertainties"
+    )
+    fit.add_argument(
+        "measured", nargs="?", metavar="SPECTRUM.csv|COLOR", help=f"CSV with columns {_SPECTRUM}; or {_COLOR}"
+    )
+    fit.add_argument(
+        "--parameters",
+        metavar="NAME[,NAME...]",
+        help="what is fitted, of melanin, hemoglobin, oxygenation, eumelanin "
+        "(default: the first three of a spectrum, two of a color); all else is fixed by the options below",
+    )
+    fit.add_argument("--specular-included", action="store_true", help="the surface's reflection is in the data")
+    fit.add_argument(
+        "--noise",
+        type=float,
+        help="standard deviation of each reflectance (default: what is left says it), or of the "
+        "color in ΔE00 (default: 1)",
+    )
+    fit.add_argument("--png", metavar="FILE", help="write a picture of data and model")
+    fit.set_defaults(run="lutgen.commands.skin.fit")
+
+    for command in (swatch, fit):
+        for name in ("melanin", "eumelanin", "hemoglobin", "oxygenation", "epidermis-mm"):
+            command.add_argument(f"--{name}", type=float)
+        command.add_argument("--scattering", help="source, bashkatov, jacques, saidi or donner")
+        command.add_argument("--saidi-a-per-mm", type=float, help="Saidi's fitted A (default: 5.7)")
+        command.add_argument("--saidi-b-nm4-per-mm", type=float, help="Saidi's fitted B (default: 8.4e10)")
+        command.add_argument("--reading", help="reduced, similarity or literal")
 
     info = commands.add_parser("info", help="what a LUT set holds")
     info.add_argument("dir", metavar="DIR")
@@ -115,7 +143,7 @@ def _parser() -> argparse.ArgumentParser:
 
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability, view, sheet, export):
+    for command in (bake, swatch, fit, info, devices, check, bench, figures, chart, stability, view, sheet, export):
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

@@ -126,6 +126,16 @@ def encode_srgb(linear) -> np.ndarray:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
+def decode_srgb(encoded) -> np.ndarray:
+    """Linear sRGB of display-encoded values of 0 or more (IEC 61966-2-1).
+
+    >>> round(float(decode_srgb(0.4614)), 4)
+    0.18
+    """
+    encoded = np.asarray(encoded, float)
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
+
 def hex_code(linear_srgb) -> str:
     """The #rrggbb code of one linear sRGB color [3].
 
@@ -145,6 +155,18 @@ def lab(xyz) -> np.ndarray:
     delta = 6 / 29
     f = np.where(ratio > delta**3, np.cbrt(ratio), ratio / (3 * delta**2) + 4 / 29)
     return np.stack([116 * f[..., 1] - 16, 500 * (f[..., 0] - f[..., 1]), 200 * (f[..., 1] - f[..., 2])], axis=-1)
+
+
+def from_lab(lab_) -> np.ndarray:
+    """XYZ [..., 3] under the D65 white of CIE L*a*b* [..., 3].
+
+    >>> from_lab(lab([0.3, 0.3, 0.2])).round(6).tolist()
+    [0.3, 0.3, 0.2]
+    """
+    L, a, b = np.moveaxis(np.asarray(lab_, float), -1, 0)
+    f = ((L + 16) / 116)[..., None] + np.stack([a / 500, np.zeros_like(a), -b / 200], axis=-1)
+    delta = 6 / 29
+    return np.where(f > delta, f**3, 3 * delta**2 * (f - 4 / 29)) * _white_xyz(WHITE_D65)
 
 
 def delta_e00(lab_1, lab_2) -> np.ndarray:
@@ -182,3 +204,16 @@ def delta_e00(lab_1, lab_2) -> np.ndarray:
     )
     terms = (l2 - l1) / s_l, (c2 - c1) / s_c, dh / s_h
     return np.sqrt(np.maximum(sum(t**2 for t in terms) + rotation * terms[1] * terms[2], 0))
+
+
+def metric(lab_) -> np.ndarray:
+    """Matrix [3, 3] that takes small L*a*b* differences from one color [3] to vectors as long as their CIEDE2000.
+
+    >>> float(np.linalg.norm(metric([60, 12, 17]) @ [0.1, 0.2, -0.1]).round(2))
+    0.23
+    >>> float(delta_e00([60, 12, 17], [60.1, 12.2, 16.9]).round(2))
+    0.23
+    """
+    lab_, step = np.asarray(lab_, float), 1e-3 * np.eye(3) / 2
+    plus, minus = (delta_e00(lab_ + step[:, None] + sign * step, lab_) ** 2 for sign in (1, -1))
+    return np.linalg.cholesky((plus - minus) / 1e-6).T

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lutgen import color
 from lutgen.errors import InputError
 
 RATIO_RANGE, SURFACE_RANGE, THICKNESS_MM = 4.0, 2.0, 32.0
@@ -140,7 +141,7 @@ def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:
     """What a map's texels stand for; thickness as a share of 32 mm."""
     if name in ("normal", "albedo"):
         if name == "albedo" and not given:
-            return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+            return color.decode_srgb(values)
         return values
     values = values.mean(axis=-1)
     if given:

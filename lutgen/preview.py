@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from PIL import Image
 
@@ -17,6 +19,8 @@ CURVES = ("very-light", "intermediate", "dark")
 RADIUS_MM = (0.001, 10.0)
 CHANNELS = (("R", "#d1401f", (), 0.3), ("G", "#2f9e44", (9, 4), 0.5), ("B", "#1c3a94", (2.5, 3), 0.7))
 """Per channel: letter, color (lightness 49, 58 and 28), dash and gap in pixels, encircled energy where it is named."""
+_CHART = (336, 52, 776, 340)
+"""Place of a chart of reflectance on a picture of one skin."""
 
 
 def _percent(share: float) -> str:
@@ -208,20 +212,65 @@ def draw_swatch(skin: Skin, result: dict) -> Image.Image:
     ]  # fmt: skip
     for i, words in enumerate(lines):
         sheet.text(24, 236 + 18 * i - 8 * (i > 1), words, 12, GRAY if i else INK)
-    left, top, right, bottom = box = (336, 52, 776, 340)
     nm, reflectance, sigma = (np.asarray(result[key], float) for key in ("wavelength_nm", "reflectance", "std_error"))
-    highest = max(float((reflectance + 2 * sigma).max()), 1e-4)
+    place = _reflectance_chart(sheet, nm, float((reflectance + 2 * sigma).max()), "diffuse reflectance")
+    if sigma.any():
+        sheet.text(_CHART[2], _CHART[1] - 10, "band: two standard errors each way", 11, GRAY, "rs")
+        outline = np.concatenate([place(reflectance + 2 * sigma), place(reflectance - 2 * sigma)[::-1]])
+        sheet.pen.polygon([tuple(p) for p in outline * OVERSAMPLE], "#c9c9c9")
+    sheet.line(place(reflectance), INK, 1.5)
+    return sheet.image.reduce(OVERSAMPLE)
+
+
+def draw_fit(skin: Skin, result: dict) -> Image.Image:
+    """Picture of a fit: both colors, what is left, parameters with sigma and both spectra; RGB, 800 x 400 pixels.
+
+    `result` is what `lutgen fit --json` prints.
+    """
+    sheet = Sheet(800, 400)
+    sides = [result[side] for side in ("measured", "model")]
+    for i, (side, words) in enumerate(zip(sides, ("measured", "model"), strict=True)):
+        left = 24 + 110 * i
+        sheet.box((left, 24, left + 110, 164), side["srgb_hex"], GRAY)
+        sheet.text(left, 184, side["srgb_hex"], 14)
+        sheet.text(left, 200, words, 12, GRAY)
+    rmse = "" if result["rmse"] is None else f", RMSE {_percent(result['rmse'])}"
+    sheet.text(24, 224, f"CIEDE2000 {result['delta_e00']:.2f}{rmse}", 12)
+    for i, name in enumerate(("melanin", "eumelanin", "hemoglobin", "oxygenation")):
+        scale, unit = (1, "") if name == "eumelanin" else (100, " %")
+        sigma = result["sigma"].get(name)
+        how = "at its bound" if name in result["sigma"] else "fixed"
+        words = f"{name} {scale * getattr(skin, name):.3g}{unit} "
+        words += how if sigma is None else f"± {scale * sigma:.2g}{unit}"
+        sheet.text(24, 246 + 18 * i, words, 12, INK if name in result["sigma"] else GRAY)
+    sheet.text(24, 318, f"epidermis {skin.epidermis_mm:g} mm", 12, GRAY)
+    sheet.text(24, 336, f"{skin.scattering} scattering, {skin.reading} reading", 12, GRAY)
+    curves = [np.asarray(side["reflectance"], float) for side in sides if "reflectance" in side]
+    place = _reflectance_chart(sheet, np.asarray(result["wavelength_nm"], float), float(np.max(curves)), "reflectance")
+    sheet.line(place(curves[-1]), INK, 1.5)
+    if len(curves) > 1:
+        for x, y in place(curves[0])[:: 1 + len(curves[0]) // 100]:
+            sheet.pen.ellipse(
+                [OVERSAMPLE * v for v in (x - 2.5, y - 2.5, x + 2.5, y + 2.5)], outline="#d1401f", width=2
+            )
+    said = ["line: model", *["circles: measured"] * (len(curves) - 1)]
+    said += ["specular included"] * result["specular_included"]
+    sheet.text(_CHART[2], _CHART[1] - 10, ", ".join(said), 11, GRAY, "rs")
+    return sheet.image.reduce(OVERSAMPLE)
+
+
+def _reflectance_chart(sheet: Sheet, nm: np.ndarray, highest: float, label: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Frame of a chart of reflectance; what it returns gives the points [n, 2] of reflectance [n] at these wavelengths."""
+    left, top, right, bottom = _CHART
+    highest = max(highest, 1e-4)
     step = next(s for s in (m * 10.0**d for d in range(-5, 1) for m in (1, 2, 5)) if highest <= 5 * s)
     count = int(np.ceil(highest / step))
+    span = max(float(np.ptp(nm)), 1.0)
     y_ticks = [(i / count, _percent(i * step)) for i in range(count + 1)]
-    x_ticks = [((v - nm[0]) / np.ptp(nm), f"{v:g}") for v in np.arange(np.ceil(nm[0] / 50) * 50, nm[-1] + 1, 50)]
-    sheet.frame(box, x_ticks, y_ticks, "wavelength (nm)", "diffuse reflectance", grid=True)
-    x = left + (nm - nm[0]) / np.ptp(nm) * (right - left)
-    scale = (bottom - top) / (count * step)
-    mean, low, high = (bottom - np.maximum(reflectance + k * sigma, 0) * scale for k in (0, -2, 2))
-    if sigma.any():
-        sheet.text(right, top - 10, "band: two standard errors each way", 11, GRAY, "rs")
-        outline = np.column_stack([np.concatenate([x, x[::-1]]), np.concatenate([low, high[::-1]])])
-        sheet.pen.polygon([tuple(p) for p in outline * OVERSAMPLE], "#c9c9c9")
-    sheet.line(np.column_stack([x, mean]), INK, 1.5)
-    return sheet.image.reduce(OVERSAMPLE)
+    every = next(s for s in (50, 20, 10, 5, 2, 1, span) if span >= 2 * s or s == span)
+    x_ticks = [
+        ((v - nm[0]) / span, f"{v:g}") for v in np.arange(np.ceil(nm[0] / every) * every, nm[0] + span + 0.5, every)
+    ]
+    sheet.frame(_CHART, x_ticks, y_ticks, "wavelength (nm)", label, grid=True)
+    x = left + (nm - nm[0]) / span * (right - left)
+    return lambda values: np.column_stack([x, bottom - np.maximum(values, 0) * (bottom - top) / (count * step)])
