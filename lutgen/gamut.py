@@ -20,7 +20,7 @@ from lutgen import color
 from lutgen.axes import Axis
 from lutgen.lutset import LutSet
 
-CHUNK = 1 << 14
+CHUNK = 1 << 15
 _XYZ = np.linalg.inv(color.SRGB_FROM_XYZ)
 _RELATIVE = (_XYZ / (_XYZ @ np.ones(3))[:, None]).astype("f4")
 _DELTA = 6 / 29
