@@ -39,8 +39,7 @@ def fitted(luts: LutSet, painted: np.ndarray, ratios: list[float], start: np.nda
 
     `start` [3] is given gain; `free` says what is found beside it: `nothing`, the `exposure`, the `tint` or `both`.
     """
-    picks = np.random.default_rng(0).integers(0, len(painted), min(_SOME, len(painted)))  # a stride could meet a pattern
-    some = painted[picks].astype(float) * start
+    some = sample(painted) * start
     first = min(ratios, key=lambda ratio: abs(ratio - EUMELANIN))
     gain, cost, at = _gain(gamut.of(luts, first), some, free)
     if len(ratios) > 1:
@@ -54,6 +53,14 @@ def fitted(luts: LutSet, painted: np.ndarray, ratios: list[float], start: np.nda
         first, _ = min(costs, key=lambda key: costs[key])
         gain, cost, at = _gain(gamut.of(luts, first), some, free)
     return Fit(start * gain, float(first), cost)
+
+
+def sample(painted: np.ndarray) -> np.ndarray:
+    """Some of the texels [N, 3], always the same; all of few."""
+    if len(painted) <= _SOME:
+        return painted.astype(float)
+    picks = np.random.default_rng(0).integers(0, len(painted), _SOME)  # a stride could meet a pattern
+    return painted[picks].astype(float)
 
 
 def _basis(free: str) -> np.ndarray:

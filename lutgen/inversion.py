@@ -11,6 +11,7 @@ Eumelanin is one number: three unknowns fit any three channels, but texel by tex
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class Inversion:
     gain: np.ndarray
     eumelanin: float
 
-    @property
+    @cached_property
     def skin(self) -> tuple[float, float, float]:
         """Median melanin, the eumelanin, median hemoglobin: what a slider must stand at to show the painted tone."""
         melanin, hemoglobin = (float(np.median(v[self.painted])) for v in (self.melanin, self.hemoglobin))

@@ -44,18 +44,13 @@ def model(name: str | None, mm_per_unit: float | None, folder: str | None, flip_
     shape = head.builtin() if name is None else mesh.of(name, mm_per_unit, flip_v)
     found = Maps(**painting.paint(shape))
     if "albedo" in shape.textures:
-        found = replace(found, chromophores=None, albedo=_linear(shape.textures["albedo"]))
+        found = replace(found, chromophores=None, albedo=color.decode_srgb(shape.textures["albedo"] / 255.0))
     if "normal" in shape.textures:
         found = replace(found, normal=shape.textures["normal"])
     if folder is not None:
         found = maps.load(Path(folder), found)
     centered = (shape.positions_mm - painting.origin_mm(shape)).astype("f4")
     return replace(shape, positions_mm=centered, notes=(*shape.notes, *painting.notes(shape))), found
-
-
-def _linear(srgb: np.ndarray) -> np.ndarray:
-    v = srgb / 255.0
-    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
 
 
 def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
