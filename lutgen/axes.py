@@ -89,6 +89,16 @@ class Axis:
         clamped = np.clip(np.asarray(value, float), self.low, self.high)
         return (self._warp(clamped) - a) / (b - a) * (self.count - 1)
 
+    def value(self, position) -> np.ndarray:
+        """The value at a node index with fraction: the inverse of `position`."""
+        if self.count == 1:
+            return np.full(np.shape(position), self.low)
+        p, share = self.exponent, position / (self.count - 1)
+        if p == 0:
+            return np.clip(self.low * (self.high / self.low) ** share, self.low, self.high)
+        even = self.low**p + share * (self.high**p - self.low**p)
+        return np.clip(even * even * even if self.spacing == "cbrt" else even ** (1 / p), self.low, self.high)
+
     def coordinate(self, value) -> np.ndarray:
         """Texture coordinate u in (0, 1) of a value; 0.5 for a fixed parameter."""
         return (self.position(value) + 0.5) / self.count

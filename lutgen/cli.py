@@ -141,9 +141,23 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--force", action="store_true", help="replace an existing folder")
     export.set_defaults(run="lutgen.commands.sets.export")
 
+    maps = commands.add_parser("maps", help="melanin and hemoglobin maps from a painted or photographed albedo")
+    maps.add_argument("albedo", metavar="ALBEDO", help="PNG, JPEG, TIFF or EXR; clear and black texels are background")
+    maps.add_argument("--luts", metavar="DIR", help="LUT set (default: the one that came along)")
+    maps.add_argument("--out", required=True, metavar="DIR", help="folder to make")
+    maps.add_argument("--format", default="png", help="png (16 bits) or exr (float)")
+    maps.add_argument("--absolute", action="store_true", help="also maps of the LUT's axes instead of ratios")
+    maps.add_argument("--encoding", help="srgb or linear (default: srgb, EXR linear Rec. 709)")
+    maps.add_argument("--balance", default="auto", help="auto, none or linear gains R,G,B")
+    maps.add_argument("--exposure", help="auto or stops (default: auto with --balance auto, else 0)")
+    maps.add_argument("--eumelanin", default="auto", help="auto or the ratio")
+    maps.add_argument("--target", help="also the albedo on another skin: a preset or melanin,eumelanin,hemoglobin")
+    maps.add_argument("--force", action="store_true", help="replace an existing folder of maps")
+    maps.set_defaults(run="lutgen.commands.maps.maps_of")
+
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, fit, info, devices, check, bench, figures, chart, stability, view, sheet, export):
+    for command in (bake, swatch, fit, info, devices, check, bench, figures, chart, stability, view, sheet, export, maps):
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

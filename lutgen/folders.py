@@ -16,13 +16,13 @@ MARK = "manifest.json"
 
 
 @contextmanager
-def whole(out: str | Path, force: bool = False) -> Iterator[Path]:
+def whole(out: str | Path, force: bool = False, mark: str = MARK) -> Iterator[Path]:
     """A folder to write into that becomes `out` when the block ends well; nothing is left of it when it does not.
 
-    With `force` an old folder is first moved aside, then deleted. Raises InputError where `out` exists or cannot be
+    With `force` an old folder that holds `mark` is first moved aside, then deleted. Raises InputError where `out` exists or cannot be
     written, MachineError on a full disk.
     """
-    target = check_target(out, force)
+    target = check_target(out, force, mark)
     partial, old = (_sibling(target, kind) for kind in ("partial", "old"))
     try:
         partial.mkdir()
@@ -42,7 +42,7 @@ def whole(out: str | Path, force: bool = False) -> Iterator[Path]:
             shutil.rmtree(leftover, ignore_errors=True)
 
 
-def check_target(out: str | Path, force: bool) -> Path:
+def check_target(out: str | Path, force: bool, mark: str = MARK) -> Path:
     """The real folder to write to; InputError, before any work, where a set cannot go there.
 
     Clears what killed bakes left, and brings back a set whose replacement was killed between its two renames.
@@ -58,9 +58,10 @@ def check_target(out: str | Path, force: bool) -> Path:
         if target.exists():
             if not force:
                 raise InputError(f"out = {out}: exists; give another folder, or --force to replace it")
-            if not target.is_dir() or (any(target.iterdir()) and not (target / MARK).exists()):
+            if not target.is_dir() or (any(target.iterdir()) and not (target / mark).exists()):
                 raise InputError(
-                    f"out = {out}: was not written by lutgen, so --force does not replace it; give another folder"
+                    f"out = {out}: was not written by lutgen (it holds no {mark}), so --force does not replace it; "
+                    "give another folder"
                 )
         if not target.parent.is_dir():
             raise InputError(f"out = {out}: there is no folder {target.parent}; make it first")

@@ -1,60 +1,62 @@
 """Painted color to pigment: which melanin and hemoglobin a color LUT would need for each texel of an albedo.
 
-*Balance*: where the albedo's median is no color of skin, one gain per channel puts it onto the nearest one; paint is
-seldom white-balanced, and the mean skin tells both exposure and tint. *Solution*: in CIELAB, from the nearest of a
-coarse table of skins by damped Gauss-Newton steps; the interpolated LUT's own derivatives are exact within a cell.
-*Blotches*: dark skin hardly shows its blood, so noise would become blotches. The albedo's low frequencies are
-therefore solved first, and each texel is held to that solution as strongly as the color alone says little. What is
-left in the low frequencies is mostly baked light; ratio maps keep only a share of it.
+*Balance*: one gain per channel, for paint is seldom white-balanced (lutgen.balance). *Solution*: the skin nearest to each
+texel's color (lutgen.gamut). *Blotches*: dark skin hardly shows its blood, so noise would become blotches. The albedo's
+low frequencies are therefore solved first, and each texel is held to that solution as strongly as the color alone says
+little. What is left in the low frequencies is mostly baked light; ratio maps may keep only a share of it.
+
+Eumelanin is one number: three unknowns fit any three channels, but texel by texel it only flips between its ends.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from lutgen import color, maps
+from lutgen import balance, color, gamut, maps
 from lutgen.errors import InputError, in_range, numbers
+from lutgen.gamut import Surface
 from lutgen.lutset import LutSet
 
-BALANCED = 2.0
-"""Color difference up to which a median counts as skin already and nothing is balanced."""
 LOW_KEPT = (0.2, 0.55)
 """Share of the low frequencies of log melanin and log hemoglobin that ratio maps keep."""
 RATIO = (0.1, 8.0)
-_HOLD = 2.0
-"""Color difference that leaving the low frequencies by a whole axis counts as."""
-_STEPS, _DAMPING, _CHUNK, _COARSE = 8, 1e-3, 1 << 16, 16
-_UNPAINTED = 1e-3
+UNPAINTED = 1e-3
+"""Mean of R, G and B up to which a texel is background where no alpha says."""
 _CELLS = 32
 """Cells along each side of what is called low frequencies; with fewer, patches of baked light show on dark skin."""
 
 
 @dataclass(frozen=True)
 class Inversion:
-    """`melanin` and `hemoglobin` [R, C], the color difference that is left [R, C] (CIE 1976), `painted` [R, C]: what is
-    no background. `gain` [3]: what the linear sRGB albedo was multiplied with. `eumelanin`: as given or fitted."""
+    """`melanin` and `hemoglobin` [R, C]; `residual` [R, C]: the CIEDE2000 difference that is left; `at_edge` [R, C]:
+    where either stands at an end of its axis; `painted` [R, C]: what is no background. `gain` [3]: what the linear sRGB
+    albedo was multiplied with. `eumelanin`: as given or fitted."""
 
     melanin: np.ndarray
     hemoglobin: np.ndarray
     residual: np.ndarray
+    at_edge: np.ndarray
     painted: np.ndarray
     gain: np.ndarray
     eumelanin: float
 
-    @property
+    @cached_property
     def skin(self) -> tuple[float, float, float]:
         """Median melanin, the eumelanin, median hemoglobin: what a slider must stand at to show the painted tone."""
         melanin, hemoglobin = (float(np.median(v[self.painted])) for v in (self.melanin, self.hemoglobin))
         return melanin, self.eumelanin, hemoglobin
 
 
-def invert(luts: LutSet, albedo, eumelanin: float | None = None, balance: bool = True) -> Inversion:
-    """Melanin and hemoglobin of an albedo [R, C, 3] in linear sRGB; black texels are background.
+def invert(
+    luts: LutSet, albedo, eumelanin: float | None = None, gain=None, painted: np.ndarray | None = None
+) -> Inversion:
+    """Melanin and hemoglobin of an albedo [R, C, 3] in linear sRGB; what is not `painted` [R, C], or black, is background.
 
-    Without `eumelanin` that of the LUT's nodes is taken which leaves least. Raises InputError for another shape, NaN,
-    negative values, or an albedo that is black throughout.
+    Without `eumelanin` or `gain` [3] they are fitted. Raises InputError for another shape, NaN, negative values, or an
+    albedo that is black throughout.
 
     >>> import lutgen
     >>> luts = lutgen.load()
@@ -62,42 +64,63 @@ def invert(luts: LutSet, albedo, eumelanin: float | None = None, balance: bool =
     >>> [round(v, 3) for v in found.skin]
     [0.05, 0.7, 0.02]
     """
-    albedo = numbers("albedo", albedo)
+    albedo, painted = checked(albedo, painted)
+    colors = albedo[painted]
+    if gain is None or eumelanin is None:
+        start = np.ones(3) if gain is None else np.asarray(gain, float)
+        fit = balance.fitted(luts, colors, ratios_of(luts, eumelanin), start, "both" if gain is None else "nothing")
+        gain, eumelanin = fit.gain, fit.eumelanin
+    eumelanin = ratios_of(luts, eumelanin)[0]
+    gain = np.asarray(gain, float)
+    surface = gamut.of(luts, eumelanin)
+    low = _low(albedo, painted)
+    held = gamut.nearest(surface, gamut.coded(low.reshape(-1, 3) * gain)).reshape(2, *low.shape[:2])
+    size = painted.shape
+    hold = np.stack([maps.resized(one, *size)[painted] for one in held]).astype("f4")
+    wanted = np.empty((3, len(colors)), "f4")
+    scale = gain.astype("f4")
+
+    def code(part: slice) -> None:
+        wanted[:, part] = gamut.coded(colors[part] * scale)
+
+    gamut.in_chunks(code, len(colors))
+    at = gamut.nearest(surface, wanted, hold)
+    melanin, hemoglobin = surface.values(at)
+    ends = [(p <= 0) | (p >= last) if last else np.zeros(p.shape, bool) for p, last in zip(at, surface.most, strict=True)]
+    layers = [
+        _laid_out(painted, values, background)
+        for values, background in (
+            (melanin, np.median(melanin)), (hemoglobin, np.median(hemoglobin)), (_left(surface, wanted, at), 0),
+            (ends[0] | ends[1], False),
+        )
+    ]  # fmt: skip
+    return Inversion(*layers, painted, gain, eumelanin)
+
+
+def checked(albedo, painted: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """An albedo [R, C, 3] and what is painted of it [R, C]; InputError where it cannot be inverted."""
+    albedo = albedo if isinstance(albedo, np.ndarray) and albedo.dtype == np.float32 else numbers("albedo", albedo)
     if albedo.ndim != 3 or albedo.shape[-1] != 3 or not albedo.size:
         raise InputError(f"albedo has shape {albedo.shape}: rows, columns and R, G, B are needed")
     if not np.all(np.isfinite(albedo)) or albedo.min() < 0:
         raise InputError("albedo holds NaN, infinite or negative values; mend it")
-    painted = albedo.sum(axis=-1) > 3 * _UNPAINTED
+    bright = albedo[..., 0] + albedo[..., 1] + albedo[..., 2] > 3 * UNPAINTED
+    painted = bright if painted is None else bright & painted
     if not painted.any():
         raise InputError("albedo is black throughout: there is no skin to invert")
+    return albedo, painted
+
+
+def ratios_of(luts: LutSet, eumelanin: float | None) -> list[float]:
+    """The eumelanin ratios that come into question: the given one, or the LUT's nodes and the presets'."""
     axis = luts.color_lut.grid.eumelanin
     if eumelanin is not None:
-        ratios_of_pigment = [in_range("eumelanin", eumelanin, axis.low, axis.high)]
-    else:
-        ratios_of_pigment = list(axis.values)
-    some = albedo[painted][:: max(1, int(painted.sum()) // 4096)]
-    fits = []
-    for e in ratios_of_pigment:
-        gain, moved = _balance(luts, some, e) if balance else (np.ones(3), 0.0)
-        left = _solved(_slice(luts, e), _lab(some * gain))[1]
-        fits.append((moved + float(np.median(left)), float(e), gain))
-    _, e, gain = min(fits, key=lambda fit: fit[0])
-    table = _slice(luts, e)
-    low = _low(albedo * gain, painted)
-    held = _solved(table, _lab(low.reshape(-1, 3)))[0].reshape(*low.shape[:2], 2)
-    size = painted.shape
-    hold = np.stack([maps.resized(held[..., k], *size)[painted] for k in (0, 1)], axis=1)
-    at, left = _solved(table, _lab(albedo[painted] * gain), hold)
-    middle = np.median(at, axis=0)
-    found = [np.full(size, value) for value in (*middle, 0.0)]
-    for values, inside in zip(found, (*at.T, left), strict=True):
-        values[painted] = inside
-    grid = luts.color_lut.grid
-    melanin, hemoglobin = (_value(a, v) for a, v in zip((grid.melanin, grid.hemoglobin), found, strict=False))
-    return Inversion(melanin, hemoglobin, found[2], painted, gain, e)
+        return [in_range("eumelanin", eumelanin, axis.low, axis.high)]
+    usual = [balance.EUMELANIN] if axis.low < balance.EUMELANIN < axis.high else []
+    return sorted({*(float(v) for v in axis.values), *usual})
 
 
-def ratios(found: Inversion, low_kept: tuple[float, float] = LOW_KEPT) -> np.ndarray:
+def ratios(found: Inversion, low_kept: tuple[float, float] = LOW_KEPT, most: tuple[float, float] = RATIO) -> np.ndarray:
     """Ratio maps [R, C, 3] of melanin, eumelanin (1) and hemoglobin as `lutgen.maps.Maps.chromophores` holds them.
 
     Median 1 each, so that the sliders set the tone; background is 1.
@@ -105,116 +128,32 @@ def ratios(found: Inversion, low_kept: tuple[float, float] = LOW_KEPT) -> np.nda
     layers = []
     for values, kept in zip((found.melanin, found.hemoglobin), low_kept, strict=True):
         log = np.log(values)
-        low = _low(log[..., None], found.painted)[..., 0]
-        log = log - (1 - kept) * maps.resized(low, *log.shape)
+        if kept < 1:
+            low = _low(log[..., None], found.painted)[..., 0]
+            log = log - (1 - kept) * maps.resized(low, *log.shape)
         ratio = np.exp(log - np.median(log[found.painted]))
-        layers.append(np.where(found.painted, np.clip(ratio, *RATIO), 1.0))
+        layers.append(np.where(found.painted, np.clip(ratio, *most), 1.0))
     return np.stack([layers[0], np.ones_like(layers[0]), layers[1]], axis=-1)
 
 
-def _balance(luts: LutSet, colors: np.ndarray, eumelanin: float) -> tuple[np.ndarray, float]:
-    """Gain [3] that puts the median of colors [N, 3] onto a color of skin, and by how much it moves it."""
-    middle = np.median(colors, axis=0)
-    at, left = _solved(_slice(luts, eumelanin), _lab(middle[None]))
-    if left[0] <= BALANCED:
-        return np.ones(3), 0.0
-    grid = luts.color_lut.grid
-    melanin, hemoglobin = (_value(a, v) for a, v in zip((grid.melanin, grid.hemoglobin), at.T, strict=True))
-    return luts.color(melanin, eumelanin, hemoglobin)[0] / np.maximum(middle, 1e-4), float(left[0])
+def _laid_out(painted: np.ndarray, values: np.ndarray, background) -> np.ndarray:
+    if painted.all():
+        return values.reshape(painted.shape)
+    whole = np.full(painted.shape, background, values.dtype)
+    whole[painted] = values
+    return whole
 
 
-def _value(axis, position: np.ndarray) -> np.ndarray:
-    """The value at a node position with fraction: the inverse of `Axis.position`."""
-    if axis.count == 1:
-        return np.full(position.shape, axis.low)
-    p, share = axis.exponent, position / (axis.count - 1)
-    if p == 0:
-        return np.clip(axis.low * (axis.high / axis.low) ** share, axis.low, axis.high)
-    return np.clip((axis.low**p + share * (axis.high**p - axis.low**p)) ** (1 / p), axis.low, axis.high)
+def _left(surface: Surface, wanted: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """CIEDE2000 differences [N] of colors [3, N] from the skins at positions [2, N]."""
+    left, offset = np.empty(wanted.shape[1], "f4"), np.array([16, 0, 0], "f4")
 
+    def compare(part: slice) -> None:
+        shown = gamut.opponent(gamut.roots(surface.read(at[:, part])[0])[0])
+        left[part] = color.delta_e00(shown.T - offset, wanted[:, part].T - offset)
 
-def _slice(luts: LutSet, eumelanin: float) -> np.ndarray:
-    """XYZ [N_h, N_m, 3] relative to white of the LUT's nodes at one eumelanin."""
-    grid = luts.color_lut.grid
-    xyz = luts.color(grid.melanin.values, eumelanin, grid.hemoglobin.values[:, None], space="srgb")
-    return _relative(xyz)
-
-
-def _relative(linear_srgb: np.ndarray) -> np.ndarray:
-    return (linear_srgb @ np.linalg.inv(color.SRGB_FROM_XYZ).T) / (np.ones(3) @ np.linalg.inv(color.SRGB_FROM_XYZ).T)
-
-
-_LAB_FROM_ROOTS = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])
-
-
-def _roots(relative: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """CIELAB's compressed XYZ and its derivative."""
-    delta = 6 / 29
-    root = np.cbrt(np.maximum(relative, 1e-12))
-    bright = relative > delta**3
-    return (np.where(bright, root, relative / (3 * delta**2) + 4 / 29),
-            np.where(bright, 1 / (3 * root * root), 1 / (3 * delta**2)))  # fmt: skip
-
-
-def _lab(linear_srgb: np.ndarray) -> np.ndarray:
-    """L*, a*, b* of linear sRGB [N, 3], L* without its offset of 16, which no difference shows."""
-    return _roots(_relative(linear_srgb))[0] @ _LAB_FROM_ROOTS.T
-
-
-def _solved(table: np.ndarray, wanted: np.ndarray, hold: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Node positions in melanin and hemoglobin [N, 2] whose colors are nearest to `wanted` [N, 3], what is left [N].
-
-    `hold` [N, 2]: positions to stay near where colors say little.
-    """
-    coarse = np.stack(
-        np.meshgrid(*(np.linspace(0, n - 1, _COARSE) for n in table.shape[1::-1]), indexing="ij"), axis=-1
-    )
-    coarse = coarse.reshape(-1, 2)
-    known = _roots(_read(table, coarse)[0])[0] @ _LAB_FROM_ROOTS.T
-    known = known.astype("f4")
-    squares = (known**2).sum(axis=1)
-    at, left = np.empty((len(wanted), 2)), np.empty(len(wanted))
-    for first in range(0, len(wanted), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        seed = coarse[(squares - 2 * (wanted[part].astype("f4") @ known.T)).argmin(axis=1)]
-        at[part], left[part] = _refined(table, wanted[part], seed, None if hold is None else hold[part])
-    return at, left
-
-
-def _read(table: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Interpolated values [N, 3] at node positions (melanin, hemoglobin) [N, 2] and their slopes along both."""
-    sizes = np.array(table.shape[1::-1])
-    low = np.minimum(at.astype(int), np.maximum(sizes - 2, 0))
-    high = np.minimum(low + 1, sizes - 1)
-    m, h = (at - low).T[..., None]
-    (a, b), (c, d) = [[table[j[:, 1], i[:, 0]] for i in (low, high)] for j in (low, high)]
-    below, above = a + m * (b - a), c + m * (d - c)
-    return below + h * (above - below), (1 - h) * (b - a) + h * (d - c), above - below
-
-
-def _refined(table, wanted, at, hold) -> tuple[np.ndarray, np.ndarray]:
-    """Damped Gauss-Newton steps from seeds, of at most two nodes each, until none moves."""
-    most = np.array(table.shape[1::-1]) - 1.0
-    pull = (_HOLD / np.maximum(most, 1)) ** 2 if hold is not None else np.zeros(2)
-    hold = at if hold is None else hold
-    for _ in range(_STEPS):
-        relative, *slopes = _read(table, at)
-        roots, rate = _roots(relative)
-        off = wanted - roots @ _LAB_FROM_ROOTS.T
-        jm, jh = ((rate * slope) @ _LAB_FROM_ROOTS.T for slope in slopes)
-        toward = np.stack([np.einsum("nc,nc->n", j, off) for j in (jm, jh)], axis=1) + pull * (hold - at)
-        stuck = ((at <= 0) & (toward < 0)) | ((at >= most) & (toward > 0))  # at an axis's end only the other one moves
-        gm, gh = np.where(stuck, 0.0, toward).T
-        mm, mh, hh = (np.einsum("nc,nc->n", *pair) for pair in ((jm, jm), (jm, jh), (jh, jh)))
-        mh = np.where(stuck.any(axis=1), 0.0, mh)
-        mm, hh = (mm + pull[0]) * (1 + _DAMPING) + 1e-9, (hh + pull[1]) * (1 + _DAMPING) + 1e-9
-        step = np.stack([hh * gm - mh * gh, mm * gh - mh * gm], axis=1) / (mm * hh - mh * mh)[:, None]
-        new = np.clip(at + np.clip(step, -2, 2), 0, most)
-        moved, at = np.abs(new - at).max(), new
-        if moved < 1e-3:
-            break
-    left = wanted - _roots(_read(table, at)[0])[0] @ _LAB_FROM_ROOTS.T
-    return at, np.linalg.norm(left, axis=1)
+    gamut.in_chunks(compare, len(left))
+    return left
 
 
 def _low(values: np.ndarray, painted: np.ndarray) -> np.ndarray:

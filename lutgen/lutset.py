@@ -176,10 +176,17 @@ class LutSet:
         albedo = numbers("albedo_rgb", albedo_rgb)
         if albedo.shape[-1:] != (3,):
             raise InputError(f"albedo_rgb has shape {albedo.shape}: the last axis must hold R, G, B")
-        before, after = (self.color(*self._chromophores(skin), space=space) for skin in (base, target))
+        before, after = (self.color(*self.chromophores(skin), space=space) for skin in (base, target))
         return albedo * (after / before)
 
-    def _chromophores(self, skin) -> tuple:
+    def chromophores(self, skin) -> tuple:
+        """Melanin, eumelanin and hemoglobin of three such numbers, or of a Skin; InputError where its other fields are
+        not the set's own.
+
+        >>> import lutgen
+        >>> lutgen.load().chromophores(lutgen.preset("dark"))
+        (0.158, 0.7, 0.018)
+        """
         if isinstance(skin, Skin):
             for name, value in self.manifest["recipe"]["skin"].items():
                 if getattr(skin, name) != value:

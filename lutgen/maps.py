@@ -8,19 +8,21 @@ Row 0 of every array here is the bottom of the picture, where v is 0.
 
 from __future__ import annotations
 
-import warnings
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from lutgen import color
+from lutgen import color, pictures
 from lutgen.errors import InputError
 
 RATIO_RANGE, SURFACE_RANGE, THICKNESS_MM = 4.0, 2.0, 32.0
 RATIOS = ("melanin", "eumelanin", "hemoglobin")
 SURFACE = ("roughness", "specular", "occlusion", "thickness")
 NAMES = (*RATIOS, *SURFACE, "normal", "albedo")
+MADE = "maps.json"
+"""What `lutgen maps` says of the maps it made."""
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
 
 
@@ -62,48 +64,8 @@ def read(path: Path) -> tuple[np.ndarray, bool]:
     EXR and 32-bit float TIFF hold values; 8- and 16-bit pictures texels: gray, palette or color, with alpha or without,
     of any size. InputError for anything else, and for NaN.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"map {path}: there is no such file")
-    values, given = (_exr(path), True) if path.suffix.lower() == ".exr" else _picture(path)
-    if not np.all(np.isfinite(values)):
-        raise InputError(f"map {path}: holds NaN or infinite values; mend it")
-    return values[::-1], given
-
-
-def _exr(path: Path) -> np.ndarray:
-    from lutgen import exr
-
-    try:
-        channels = next(iter(exr.read(path).values())).channels
-        names = [n for n in "RGB" if n in channels] if set("RGB") <= set(channels) else sorted(channels)[-1:]
-        return np.stack([channels[n].astype(float) for n in names], axis=-1)
-    except ValueError as error:  # InputError too, which speaks of LUT sets
-        raise InputError(f"map {path}: not a whole OpenEXR file, or its channels differ in size") from error
-
-
-def _picture(path: Path) -> tuple[np.ndarray, bool]:
-    from PIL import Image
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # 16k maps are no bombs
-            with Image.open(path) as image:
-                image.load()
-        if image.mode == "F":
-            return np.asarray(image, float)[..., None], True
-        if image.mode.startswith("I"):
-            values = np.asarray(image, float)[..., None]
-            if values.max() > 65535 or values.min() < 0:
-                raise InputError(f"map {path}: holds integers of 32 bits; save it with 8 or 16, or as EXR")
-            return values / 65535, False
-        if image.mode in ("1", "L", "LA"):
-            return np.asarray(image.convert("L"), float)[..., None] / 255, False
-        return np.asarray(image.convert("RGB"), float) / 255, False
-    except InputError:
-        raise
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InputError(f"map {path}: not a picture that can be read ({error})") from error
+    found = pictures.read(path, "map")
+    return found.values[::-1].astype(float), found.bits == 32
 
 
 def load(folder: Path, under: Maps | None = None) -> Maps:
@@ -133,8 +95,16 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
         _together(values, SURFACE, below.surface),
         _color(values["normal"]) if "normal" in values else below.normal,
         _color(values["albedo"]) if "albedo" in values else below.albedo,
-        below.full_contrast_melanin,
+        _melanin_of(folder) or below.full_contrast_melanin,
     )  # fmt: skip
+
+
+def _melanin_of(folder: Path) -> float | None:
+    """The median melanin that `lutgen maps` found; None where the folder is not of its making."""
+    try:
+        return float(json.loads((folder / MADE).read_text())["skin"]["melanin"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:

@@ -1,0 +1,164 @@
+"""An albedo taken apart: maps."""
+
+from __future__ import annotations
+
+import time
+from argparse import Namespace
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+import lutgen
+from lutgen import albedo, balance, folders, inversion, maps, mapset, retarget
+from lutgen.commands import Outcome
+from lutgen.errors import InputError, in_range, one_of
+from lutgen.lutset import LutSet
+from lutgen.progress import Progress
+from lutgen.tissue import PRESETS
+
+GAINS, STOPS = (0.01, 100.0), (-8.0, 8.0)
+
+
+def maps_of(options: Namespace) -> Outcome:
+    """`lutgen maps`: an albedo to a folder of maps."""
+    one_of("format", options.format, mapset.FORMATS)
+    start, free = light(options.balance, options.exposure)
+    source = Path(options.albedo)
+    out = folders.check_target(options.out, options.force, maps.MADE)
+    if source.resolve().is_relative_to(out):
+        raise InputError(f"out = {options.out}: holds the albedo {source}, which would go; give another folder")
+    clock, seconds = time.perf_counter(), {}
+
+    def stop(name: str) -> None:
+        nonlocal clock
+        now = time.perf_counter()
+        seconds[name], clock = round(now - clock, 4), now
+
+    with Progress(quiet=options.json) as progress:
+        luts = lutgen.load(options.luts)
+        eumelanin = None if options.eumelanin == "auto" else _number("eumelanin", options.eumelanin)
+        candidates = inversion.ratios_of(luts, eumelanin)
+        target = None if options.target is None else target_of(luts, options.target)
+        progress("read the albedo", None)
+        given = albedo.read(source, options.encoding)
+        stop("read")
+        progress("fit the light", None)
+        warning = albedo.doubt(luts, given)
+        fit = balance.fitted(luts, given.linear[given.painted], candidates, start, free)
+        stop("fit")
+        progress("invert", None)
+        found = inversion.invert(luts, given.linear, fit.eumelanin, fit.gain, given.painted)
+        stop("invert")
+        recolored = None
+        if target is not None:
+            progress("recolor", None)
+            recolored = retarget.recolored(luts, found, given.linear, target)
+            stop("recolor")
+        progress("write", None)
+        facts = _facts(luts, given, found, options, target, [] if warning is None else [warning])
+        with folders.whole(options.out, options.force, maps.MADE) as folder:
+            made = mapset.layers(luts, found, options.absolute)
+            mapset.write(folder, made, options.format, recolored, given.alpha, facts)
+            _preview(folder / "preview.png", luts, given.linear * found.gain, found, made, facts, recolored)
+        stop("write")
+    seconds["total"] = round(sum(seconds.values()), 4)
+    per_pixel = 1e6 * seconds["invert"] / found.painted.size
+    result = {"out": str(out), **facts, "seconds": seconds, "invert_us_per_pixel": round(per_pixel, 3)}
+    return result, _text(result, options), 0
+
+
+def light(wanted: str, exposure: str | None) -> tuple[np.ndarray, str]:
+    """Gain [3] to start from, and what `balance.fitted` is to find beside it, of --balance and --exposure.
+
+    Without an exposure it is found where the balance is, else it is 0 stops.
+    """
+    gain, tint = np.ones(3), wanted == "auto"
+    if wanted not in ("auto", "none"):
+        try:
+            gain = np.array([float(part) for part in wanted.split(",")])
+        except ValueError:
+            gain = np.empty(0)
+        if gain.shape != (3,):
+            raise InputError(f"balance = {wanted!r}: auto, none or three gains R,G,B are needed, for example 1.1,1,0.9")
+        for value in gain:
+            in_range("balance", value, *GAINS)
+    level = tint if exposure is None else exposure == "auto"
+    if exposure not in (None, "auto"):
+        gain = gain * 2 ** in_range("exposure", _number("exposure", exposure), *STOPS, " stops")
+    return gain, {(True, True): "both", (True, False): "tint", (False, True): "exposure"}.get((tint, level), "nothing")
+
+
+def target_of(luts: LutSet, text: str) -> tuple[float, float, float]:
+    """Melanin, eumelanin and hemoglobin of a preset's name or of three numbers with commas; InputError outside the LUT."""
+    if text in PRESETS:
+        skin = luts.chromophores(PRESETS[text])
+    else:
+        parts = text.split(",")
+        if len(parts) != 3:
+            raise InputError(
+                f"target = {text!r}: allowed is {', '.join(PRESETS)}, or melanin,eumelanin,hemoglobin such as 0.1,0.7,0.01"
+            )
+        skin = tuple(_number("target", part) for part in parts)
+    try:
+        luts.color(*skin)
+    except InputError as error:
+        raise InputError(f"target: {error}") from error
+    return skin
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{name} = {text!r}: a number or auto is needed") from None
+
+
+def _facts(luts: LutSet, given: albedo.Albedo, found: inversion.Inversion, options: Namespace, target, warnings) -> dict:
+    """What maps.json says besides its files."""
+    stops = float(np.mean(np.log2(found.gain)))
+    rows, columns = found.painted.shape
+    return {
+        "lutgen": version("lutgen"), "albedo": Path(options.albedo).name, "size": [columns, rows],
+        "encoding": given.encoding, "oxygenation": luts.oxygenation,
+        "skin": dict(zip(maps.RATIOS, found.skin, strict=True)),
+        "gain": found.gain.tolist(), "exposure_stops": stops, "balance": (found.gain / 2**stops).tolist(),
+        "target": None if target is None else dict(zip(maps.RATIOS, target, strict=True)) | {"named": options.target},
+        "residual": mapset.statistics(found), "out_of_reach_delta_e00": mapset.REACH, "warnings": warnings,
+    }  # fmt: skip
+
+
+def _preview(path: Path, luts: LutSet, balanced, found, made, facts: dict, recolored) -> None:
+    from lutgen import map_preview
+
+    left = facts["residual"]
+    words = (
+        f"{facts['albedo']}, {facts['size'][0]} x {facts['size'][1]}, read as {facts['encoding']}; CIEDE2000 left: median "
+        f"{left['delta_e00_median']:.2f}, p95 {left['delta_e00_p95']:.2f}; out of reach {left['out_of_reach_share']:.1%}"
+    )
+    name = facts["target"]["named"] if facts["target"] else ""
+    map_preview.draw(luts, balanced, found, made, words, recolored, name).save(path, compress_level=3)
+
+
+def _text(result: dict, options: Namespace) -> str:
+    left, skin, seconds = result["residual"], result["skin"], result["seconds"]
+    sliders = " ".join(f"--set {name}={value:.4g}" for name, value in skin.items())
+    lines = [
+        result["out"],
+        f"skin: melanin {skin['melanin']:.3g}, eumelanin {skin['eumelanin']:.2g}, hemoglobin {skin['hemoglobin']:.3g} "
+        f"(median); oxygenation {result['oxygenation']:g}",
+        f"light: exposure {result['exposure_stops']:+.2f} stops, balance "
+        + ",".join(f"{v:.3f}" for v in result["balance"]) + f"; read as {result['encoding']}",
+        f"left: ΔE00 median {left['delta_e00_median']:.2f}, mean {left['delta_e00_mean']:.2f}, p95 "
+        f"{left['delta_e00_p95']:.2f}, max {left['delta_e00_max']:.1f}; {left['out_of_reach_share']:.2%} out of reach "
+        f"(above {result['out_of_reach_delta_e00']:g}), {left['at_edge_share']:.2%} at an end of the LUT's axes",
+    ]  # fmt: skip
+    if options.format == "png" and left["beyond_png_ratio_share"] > 0:
+        lines.append(
+            f"{left['beyond_png_ratio_share']:.2%} of texels have more than {maps.RATIO_RANGE:g} times the median, which "
+            "is the most that PNG holds; --format exr keeps them"
+        )
+    lines.append(", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
+                 + f"; inverted in {result['invert_us_per_pixel']:.2f} µs a pixel")  # fmt: skip
+    lines.append(f"see it: lutgen view --maps {result['out']} {sliders}")
+    return "\n".join(lines + [f"warning: {one}" for one in result["warnings"]])
