@@ -24,8 +24,8 @@ _HEMOGLOBIN = float(np.median([s.hemoglobin for s in _MEASURED]))
 _TONE_SPREAD = 0.5
 """How far in logarithm a median lies from measured skin as readily as its texels lie off by half a color difference."""
 _DOUBT, _FARTHER = 2.0, 0.5
-"""The other reading is named where this one's score is so many times as large, and larger by so much. Where the file was
-said to be other than its kind is, that it is larger is enough."""
+"""The other reading is named where this one's score is so many times as large, and larger by so much. Where the file
+was said to be other than its kind is, that it is larger is enough."""
 _COLORLESS = 0.02
 
 
@@ -88,7 +88,7 @@ def doubt(luts: LutSet, albedo: Albedo) -> str | None:
 
 
 def _tone(luts: LutSet, colors: np.ndarray) -> tuple[float, str]:
-    """How far colors [N, 3] are from measured skin, each part in halves of a color difference, and the tone in words."""
+    """How far colors [N, 3] are from measured skin, in color differences, and the tone in words."""
     usual = min(ratios_of(luts, None), key=lambda ratio: abs(ratio - balance.EUMELANIN))
     fit = balance.fitted(luts, colors, [usual], np.ones(3), "both")
     surface = gamut.of(luts, usual)

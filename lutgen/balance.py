@@ -1,8 +1,9 @@
 """Light that an albedo was painted or photographed in: the gain per channel that makes its colors those of skin.
 
 Skins are a surface among the colors. The gain is moved until the albedo's texels lie as near that surface as they can
-(their mean distance, in which few outliers count little), and as near 1 as a prior holds it, for light and pigment trade
-off: a darker exposure looks like more melanin, a redder light like more blood. What skin can explain is not balanced.
+(their mean distance, in which few outliers count little), and as near 1 as a prior holds it, for light and pigment
+trade off: a darker exposure looks like more melanin, a redder light like more blood. What skin can explain is not
+balanced.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def _basis(free: str) -> np.ndarray:
 
 
 def _gain(surface: Surface, some: np.ndarray, free: str) -> tuple[np.ndarray, float, np.ndarray]:
-    """Gain [3], its cost and positions [2, N]: steps of least squares on the distance from the surface, reweighted to its size."""
+    """Gain [3], its cost and positions [2, N], by least squares on the distances, reweighted to their mean size."""
     basis, at = _basis(free), None
     amount, best, costs = np.zeros(basis.shape[1]), np.ones(3), []
     while len(costs) < _STEPS:

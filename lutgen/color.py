@@ -117,12 +117,12 @@ def _matrix(space: str, pipeline: str) -> np.ndarray:
 
 
 def encode_srgb(linear) -> np.ndarray:
-    """Display-encoded sRGB in 0 to 1 of linear sRGB, clipped first (IEC 61966-2-1).
+    """Display-encoded sRGB in 0 to 1 of linear sRGB, clipped first, in single precision where it is (IEC 61966-2-1).
 
     >>> round(float(encode_srgb(0.18)), 4)
     0.4614
     """
-    linear = np.clip(np.asarray(linear, float), 0, 1)
+    linear = np.clip(_floats(linear), 0, 1)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
@@ -132,9 +132,13 @@ def decode_srgb(encoded) -> np.ndarray:
     >>> round(float(decode_srgb(0.4614)), 3)
     0.18
     """
-    encoded = np.asarray(encoded)
-    encoded = encoded if encoded.dtype == np.float32 else encoded.astype(float)
+    encoded = _floats(encoded)
     return np.where(encoded <= 0.04045, encoded / 12.92, (np.maximum(encoded + 0.055, 0) / 1.055) ** 2.4)
+
+
+def _floats(values) -> np.ndarray:
+    values = np.asarray(values)
+    return values if values.dtype == np.float32 else values.astype(float)
 
 
 def hex_code(linear_srgb) -> str:
@@ -176,7 +180,9 @@ def delta_e00(lab_1, lab_2) -> np.ndarray:
     >>> round(float(delta_e00([50, 2.6772, -79.7751], [50, 0, -82.7485])), 4)
     2.0425
     """
-    single = all(getattr(lab, "dtype", None) == np.float32 for lab in (lab_1, lab_2))  # stays so: 1e-5 off, twice as fast
+    single = all(
+        getattr(lab, "dtype", None) == np.float32 for lab in (lab_1, lab_2)
+    )  # stays so: 1e-5 off, twice as fast
     l1, a1, b1 = np.moveaxis(np.asarray(lab_1, "f4" if single else "f8"), -1, 0)
     l2, a2, b2 = np.moveaxis(np.asarray(lab_2, "f4" if single else "f8"), -1, 0)
     mean_chroma7 = ((np.hypot(a1, b1) + np.hypot(a2, b2)) / 2) ** 7

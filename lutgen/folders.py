@@ -19,8 +19,8 @@ MARK = "manifest.json"
 def whole(out: str | Path, force: bool = False, mark: str = MARK) -> Iterator[Path]:
     """A folder to write into that becomes `out` when the block ends well; nothing is left of it when it does not.
 
-    With `force` an old folder that holds `mark` is first moved aside, then deleted. Raises InputError where `out` exists or cannot be
-    written, MachineError on a full disk.
+    With `force` an old folder that holds `mark` is first moved aside, then deleted. Raises InputError where `out`
+    exists or cannot be written, MachineError on a full disk.
     """
     target = check_target(out, force, mark)
     partial, old = (_sibling(target, kind) for kind in ("partial", "old"))

@@ -1,4 +1,4 @@
-"""The colors that skin of one eumelanin ratio can have, as a surface over melanin and hemoglobin, and its nearest point.
+"""The colors of skin at one eumelanin ratio as a surface over melanin and hemoglobin, and its point nearest a color.
 
 *Computation*: the color LUT at that eumelanin is bilinear within a cell, in XYZ relative to white. *Metric*: CIELAB
 whose lightness, chroma and hue are divided as CIEDE2000 does at the wanted color, so that what is nearest is nearest
@@ -26,7 +26,7 @@ _RELATIVE = (_XYZ / (_XYZ @ np.ones(3))[:, None]).astype("f4")
 _DELTA = 6 / 29
 _STARTS, _ACROSS, _MARGIN = 16, 24, 12.0
 """Nodes along each axis of the starting points; cells along each side of their table; CIELAB units beyond the skins."""
-_HOLD = 2.0
+_HOLD = 1.5
 """Color difference that leaving what a texel is held to by a whole axis counts as."""
 _REACH = (2.0, 2.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 """Most nodes that each step may go: where cells meet in a crease, steps would jump across it forever."""
@@ -132,7 +132,7 @@ class Surface:
 
     @cached_property
     def _starts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Lowest corner [3] and cells per unit [3] of a table over CIELAB, and the nearest skin of each cell [2, ..]."""
+        """Lowest corner [3] and cells per unit [3] of a table over CIELAB, and each cell's nearest skin [2, ..]."""
         grid = np.meshgrid(*(np.linspace(0, n, _STARTS, dtype="f4") for n in self.most), indexing="ij")
         at = np.stack([g.ravel() for g in grid])
         known = opponent(roots(self.read(at)[0])[0])
@@ -170,12 +170,12 @@ def nearest(surface: Surface, wanted: np.ndarray, hold: np.ndarray | None = None
     """
     at = np.empty((2, wanted.shape[1]), "f4")
 
-    def solve(part: slice) -> None:
+    def _solve(part: slice) -> None:
         at[:, part] = refined(
             surface, wanted[:, part], surface.start(wanted[:, part]), None if hold is None else hold[:, part]
         )
 
-    in_chunks(solve, wanted.shape[1])
+    in_chunks(_solve, wanted.shape[1])
     return at
 
 

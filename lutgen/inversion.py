@@ -1,9 +1,9 @@
 """Painted color to pigment: which melanin and hemoglobin a color LUT would need for each texel of an albedo.
 
-*Balance*: one gain per channel, for paint is seldom white-balanced (lutgen.balance). *Solution*: the skin nearest to each
-texel's color (lutgen.gamut). *Blotches*: dark skin hardly shows its blood, so noise would become blotches. The albedo's
-low frequencies are therefore solved first, and each texel is held to that solution as strongly as the color alone says
-little. What is left in the low frequencies is mostly baked light; ratio maps may keep only a share of it.
+*Balance*: one gain per channel, for paint is seldom white-balanced (lutgen.balance). *Solution*: the skin nearest to
+each texel's color (lutgen.gamut). *Blotches*: dark skin hardly shows its blood, so noise would become blotches. The
+albedo's low frequencies are therefore solved first, and each texel is held to that solution as strongly as the color
+alone says little. What is left in the low frequencies is mostly baked light; ratio maps may keep only a share of it.
 
 Eumelanin is one number: three unknowns fit any three channels, but texel by texel it only flips between its ends.
 """
@@ -53,9 +53,9 @@ class Inversion:
 def invert(
     luts: LutSet, albedo, eumelanin: float | None = None, gain=None, painted: np.ndarray | None = None
 ) -> Inversion:
-    """Melanin and hemoglobin of an albedo [R, C, 3] in linear sRGB; what is not `painted` [R, C], or black, is background.
+    """Melanin and hemoglobin of an albedo [R, C, 3] in linear sRGB.
 
-    Without `eumelanin` or `gain` [3] they are fitted. Raises InputError for another shape, NaN, negative values, or an
+    What is not `painted` [R, C], or black, is background. Without `eumelanin` or `gain` [3] they are fitted. Raises InputError for another shape, NaN, negative values, or an
     albedo that is black throughout.
 
     >>> import lutgen
@@ -80,21 +80,20 @@ def invert(
     wanted = np.empty((3, len(colors)), "f4")
     scale = gain.astype("f4")
 
-    def code(part: slice) -> None:
+    def _code(part: slice) -> None:
         wanted[:, part] = gamut.coded(colors[part] * scale)
 
-    gamut.in_chunks(code, len(colors))
+    gamut.in_chunks(_code, len(colors))
     at = gamut.nearest(surface, wanted, hold)
     melanin, hemoglobin = surface.values(at)
-    ends = [(p <= 0) | (p >= last) if last else np.zeros(p.shape, bool) for p, last in zip(at, surface.most, strict=True)]
-    layers = [
-        _laid_out(painted, values, background)
-        for values, background in (
-            (melanin, np.median(melanin)), (hemoglobin, np.median(hemoglobin)), (_left(surface, wanted, at), 0),
-            (ends[0] | ends[1], False),
-        )
-    ]  # fmt: skip
-    return Inversion(*layers, painted, gain, eumelanin)
+    ends = [
+        (p <= 0) | (p >= last) if last else np.zeros(p.shape, bool) for p, last in zip(at, surface.most, strict=True)
+    ]
+    return Inversion(
+        _laid_out(painted, melanin, np.median(melanin)), _laid_out(painted, hemoglobin, np.median(hemoglobin)),
+        _laid_out(painted, _left(surface, wanted, at), 0), _laid_out(painted, ends[0] | ends[1], False),
+        painted, gain, eumelanin,
+    )  # fmt: skip
 
 
 def checked(albedo, painted: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -148,11 +147,11 @@ def _left(surface: Surface, wanted: np.ndarray, at: np.ndarray) -> np.ndarray:
     """CIEDE2000 differences [N] of colors [3, N] from the skins at positions [2, N]."""
     left, offset = np.empty(wanted.shape[1], "f4"), np.array([16, 0, 0], "f4")
 
-    def compare(part: slice) -> None:
+    def _compare(part: slice) -> None:
         shown = gamut.opponent(gamut.roots(surface.read(at[:, part])[0])[0])
         left[part] = color.delta_e00(shown.T - offset, wanted[:, part].T - offset)
 
-    gamut.in_chunks(compare, len(left))
+    gamut.in_chunks(_compare, len(left))
     return left
 
 

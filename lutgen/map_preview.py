@@ -52,7 +52,9 @@ def draw(
         sheet.text(x + SIDE, y, note, 12, GRAY, "rs")
         pixels = np.where(painted[..., None], pixels, _BACKGROUND)
         size = SIDE * OVERSAMPLE, height * OVERSAMPLE
-        sheet.image.paste(Image.fromarray(pixels).resize(size, Image.Resampling.BILINEAR), (x * OVERSAMPLE, (y + 10) * OVERSAMPLE))
+        sheet.image.paste(
+            Image.fromarray(pixels).resize(size, Image.Resampling.BILINEAR), (x * OVERSAMPLE, (y + 10) * OVERSAMPLE)
+        )
         sheet.box((x, y + 10, x + SIDE, y + 10 + height), outline=RULE)
         if title == "color difference left":
             _scale(sheet, x + SIDE, y)
@@ -72,8 +74,8 @@ def _scale(sheet: Sheet, right: float, y: float) -> None:
 
 
 def _fewer(shape: tuple[int, ...]) -> tuple[slice, slice]:
-    """Every n-th row and column, so that the smaller side has about twice the pixels shown."""
-    step = max(1, min(shape) // (2 * SIDE))
+    """Every n-th row and column, so that the smaller side has at least the pixels shown."""
+    step = max(1, min(shape) // SIDE)
     return slice(None, None, step), slice(None, None, step)
 
 

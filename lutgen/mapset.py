@@ -56,7 +56,9 @@ def layers(luts: LutSet, found: Inversion, absolute: bool = False) -> dict[str, 
         "CIEDE2000 difference from the balanced albedo",
     )  # fmt: skip
     missed = out_of_reach(found)
-    coded = f"{BEYOND:g}: farther than {REACH:g} from any skin (CIEDE2000); {AT_EDGE:g}: at an end of a LUT axis; else 0"
+    coded = (
+        f"{BEYOND:g}: farther than {REACH:g} from any skin (CIEDE2000); {AT_EDGE:g}: at an end of a LUT axis; else 0"
+    )
     result["out_of_reach"] = Layer(missed, missed, coded, coded)
     return result
 
@@ -79,7 +81,7 @@ def out_of_reach(found: Inversion) -> np.ndarray:
 
 
 def statistics(found: Inversion) -> dict:
-    """Of painted texels: CIEDE2000 mean, median, p95, max; shares out of reach, at an edge, beyond what PNG ratios hold."""
+    """CIEDE2000 left in painted texels, and their shares out of reach, at an edge, beyond what PNG ratios hold."""
     left = found.residual[found.painted]
     skin = found.skin
     beyond = (found.melanin > maps.RATIO_RANGE * skin[0]) | (found.hemoglobin > maps.RATIO_RANGE * skin[2])
@@ -96,11 +98,11 @@ def statistics(found: Inversion) -> dict:
 def write(
     folder: Path, made: dict[str, Layer], kind: str, recolored: np.ndarray | None, alpha: np.ndarray | None, facts: dict
 ) -> None:
-    """Write the maps as 16-bit PNG or float EXR, the recolored albedo [R, C, 3] in linear sRGB if any, and maps.json."""
+    """Write the maps as 16-bit PNG or float EXR, a recolored albedo [R, C, 3] in linear sRGB, and maps.json."""
     files = {f"{name}.{kind}": layer.png if kind == "png" else layer.exr for name, layer in made.items()}
     jobs = [(folder / name, layer) for name, layer in zip(files, made.values(), strict=True)]
 
-    def put(job: tuple[Path, Layer]) -> None:
+    def _put(job: tuple[Path, Layer]) -> None:
         path, layer = job
         if kind == "png":
             pictures.write_16_bit(path, layer.texels)
@@ -108,7 +110,7 @@ def write(
             exr.write(path, [exr.Part(path.stem, {"Y": layer.values.astype("f4")}, {"meaning": layer.exr})], exr.REC709)
 
     with ThreadPoolExecutor() as threads:
-        waiting = [threads.submit(put, job) for job in jobs]
+        waiting = [threads.submit(_put, job) for job in jobs]
         if recolored is not None:
             name = f"recolored.{kind}"
             files[name] = "albedo on the target skin: " + ("sRGB" if kind == "png" else "linear Rec. 709")

@@ -1,7 +1,7 @@
 """Pictures that hold data: read with every bit and their alpha, written with 16 bits.
 
-Pillow keeps 8 of a color channel's 16 bits. It reads the upper byte of each; told that the bytes lie the other way round
-it reads the lower one, and both together are the channel.
+Pillow keeps 8 of a color channel's 16 bits. It reads the upper byte of each; told that the bytes lie the other way
+round it reads the lower one, and both together are the channel.
 """
 
 from __future__ import annotations
@@ -105,23 +105,21 @@ def _raw_mode(tile) -> str | None:
     return tile[3] if isinstance(tile[3], str) else next((one for one in tile[3] or () if isinstance(one, str)), None)
 
 
+def _other_bytes(tile):
+    """The same part, told that its bytes lie the other way round."""
+    raw = _raw_mode(tile) or ""
+    swap = raw[:-3] + _SWAPPED.get(raw[-3:], raw[-3:])
+    given = tile[3]
+    arguments = swap if isinstance(given, str) else tuple(swap if one == raw else one for one in given)
+    return tile._replace(args=arguments) if hasattr(tile, "_replace") else (*tile[:3], arguments)  # names: Pillow 11
+
+
 def _deep(path: Path, upper: np.ndarray) -> Picture:
     """A picture of 16 bits a color channel, whose upper bytes are known."""
     from PIL import Image
 
-    def swapped(raw: str) -> str:
-        return raw[:-3] + _SWAPPED.get(raw[-3:], raw[-3:])
-
     with Image.open(path) as image:
-        raws = [_raw_mode(tile) or "" for tile in image.tile]
-        arguments = [
-            swapped(raw) if isinstance(tile[3], str) else tuple(swapped(raw) if one == raw else one for one in tile[3])
-            for tile, raw in zip(image.tile, raws, strict=True)
-        ]
-        image.tile = [  # tuples with names since Pillow 11
-            tile._replace(args=args) if hasattr(tile, "_replace") else (*tile[:3], args)
-            for tile, args in zip(image.tile, arguments, strict=True)
-        ]
+        image.tile = [_other_bytes(tile) for tile in image.tile]  # type: ignore[assignment]
         image.load()
         lower = np.asarray(image)
     values = (np.float32(256) * upper + lower) / np.float32(65535)
@@ -139,5 +137,5 @@ def write_16_bit(path: Path, texels: np.ndarray) -> None:
     header = struct.pack(">IIBBBBB", columns, rows, 16, {1: 0, 3: 2, 4: 6}[channels], 0, 0, 0)
     with open(path, "wb") as file:
         file.write(b"\x89PNG\r\n\x1a\n")
-        for kind, data in ((b"IHDR", header), (b"IDAT", zlib.compress(lines, 3)), (b"IEND", b"")):
+        for kind, data in ((b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes(), 3)), (b"IEND", b"")):
             file.write(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))

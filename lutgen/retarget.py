@@ -27,8 +27,8 @@ def moves(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """For melanin and for hemoglobin: values around `base` [N], rising, and what becomes of each around `target` [N].
 
-    A value's ratio to the base is kept where the luminance that it makes, over its skin's, differs on the target no more
-    than on the base; else the value is the one that makes the same.
+    A value's ratio to the base is kept where the luminance that it makes, over its skin's, differs on the target no
+    more than on the base; else the value is the one that makes the same.
     """
     grid, found = luts.color_lut.grid, []
     for k, axis in ((0, grid.melanin), (2, grid.hemoglobin)):
@@ -49,7 +49,7 @@ def moves(
 def recolored(luts: LutSet, found: Inversion, albedo: np.ndarray, target: tuple[float, float, float]) -> np.ndarray:
     """The inverted albedo [R, C, 3] in linear sRGB on another skin (melanin, eumelanin, hemoglobin), white-balanced.
 
-    Its median texel becomes the target's color; background stays as it is. Raises InputError for a skin outside the LUT.
+    Its median texel becomes the target's color; background stays as it is. InputError for a skin outside the LUT.
     """
     curves = moves(luts, found.skin, target)
     before, after = gamut.of(luts, found.eumelanin), gamut.of(luts, target[1])
@@ -59,14 +59,14 @@ def recolored(luts: LutSet, found: Inversion, albedo: np.ndarray, target: tuple[
     out = np.array(albedo, "f4")
     moved = np.empty_like(painted, "f4")
 
-    def move(part: slice) -> None:
+    def _move(part: slice) -> None:
         goal = np.stack([np.interp(v, *curve) for v, curve in zip(skins[:, part], curves, strict=True)])
         was, now = _acescg(before, skins[:, part]), _acescg(after, goal)
         given = _ACESCG @ gamut.relative(painted[part] * gain)
         factor = np.clip(given / np.maximum(was, np.float32(1e-5)), *np.array(_FACTOR, "f4"))
         moved[part] = np.maximum(_SRGB_FROM_ACESCG @ (now * factor), 0).T
 
-    gamut.in_chunks(move, len(painted))
+    gamut.in_chunks(_move, len(painted))
     out[inside] = moved
     return out
 

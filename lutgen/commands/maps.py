@@ -30,7 +30,7 @@ def maps_of(options: Namespace) -> Outcome:
         raise InputError(f"out = {options.out}: holds the albedo {source}, which would go; give another folder")
     clock, seconds = time.perf_counter(), {}
 
-    def stop(name: str) -> None:
+    def _stop(name: str) -> None:
         nonlocal clock
         now = time.perf_counter()
         seconds[name], clock = round(now - clock, 4), now
@@ -42,26 +42,26 @@ def maps_of(options: Namespace) -> Outcome:
         target = None if options.target is None else target_of(luts, options.target)
         progress("read the albedo", None)
         given = albedo.read(source, options.encoding)
-        stop("read")
+        _stop("read")
         progress("fit the light", None)
         warning = albedo.doubt(luts, given)
         fit = balance.fitted(luts, given.linear[given.painted], candidates, start, free)
-        stop("fit")
+        _stop("fit")
         progress("invert", None)
         found = inversion.invert(luts, given.linear, fit.eumelanin, fit.gain, given.painted)
-        stop("invert")
+        _stop("invert")
         recolored = None
         if target is not None:
             progress("recolor", None)
             recolored = retarget.recolored(luts, found, given.linear, target)
-            stop("recolor")
+            _stop("recolor")
         progress("write", None)
         facts = _facts(luts, given, found, options, target, [] if warning is None else [warning])
         with folders.whole(options.out, options.force, maps.MADE) as folder:
             made = mapset.layers(luts, found, options.absolute)
             mapset.write(folder, made, options.format, recolored, given.alpha, facts)
             _preview(folder / "preview.png", luts, given.linear * found.gain, found, made, facts, recolored)
-        stop("write")
+        _stop("write")
     seconds["total"] = round(sum(seconds.values()), 4)
     per_pixel = 1e6 * seconds["invert"] / found.painted.size
     result = {"out": str(out), **facts, "seconds": seconds, "invert_us_per_pixel": round(per_pixel, 3)}
@@ -90,21 +90,18 @@ def light(wanted: str, exposure: str | None) -> tuple[np.ndarray, str]:
 
 
 def target_of(luts: LutSet, text: str) -> tuple[float, float, float]:
-    """Melanin, eumelanin and hemoglobin of a preset's name or of three numbers with commas; InputError outside the LUT."""
-    if text in PRESETS:
-        skin = luts.chromophores(PRESETS[text])
-    else:
-        parts = text.split(",")
-        if len(parts) != 3:
-            raise InputError(
-                f"target = {text!r}: allowed is {', '.join(PRESETS)}, or melanin,eumelanin,hemoglobin such as 0.1,0.7,0.01"
-            )
-        skin = tuple(_number("target", part) for part in parts)
+    """Melanin, eumelanin and hemoglobin of a preset's name or of three numbers; InputError outside the LUT."""
+    parts = text.split(",")
+    if text not in PRESETS and len(parts) != 3:
+        allowed = f"{', '.join(PRESETS)}, or melanin,eumelanin,hemoglobin such as 0.1,0.7,0.01"
+        raise InputError(f"target = {text!r}: allowed is {allowed}")
+    skin = PRESETS[text] if text in PRESETS else [_number("target", part) for part in parts]
     try:
-        luts.color(*skin)
+        melanin, eumelanin, hemoglobin = luts.chromophores(skin)
+        luts.color(melanin, eumelanin, hemoglobin)
     except InputError as error:
         raise InputError(f"target: {error}") from error
-    return skin
+    return melanin, eumelanin, hemoglobin
 
 
 def _number(name: str, text: str) -> float:
@@ -114,7 +111,9 @@ def _number(name: str, text: str) -> float:
         raise InputError(f"{name} = {text!r}: a number or auto is needed") from None
 
 
-def _facts(luts: LutSet, given: albedo.Albedo, found: inversion.Inversion, options: Namespace, target, warnings) -> dict:
+def _facts(
+    luts: LutSet, given: albedo.Albedo, found: inversion.Inversion, options: Namespace, target, warnings
+) -> dict:
     """What maps.json says besides its files."""
     stops = float(np.mean(np.log2(found.gain)))
     rows, columns = found.painted.shape
@@ -133,8 +132,9 @@ def _preview(path: Path, luts: LutSet, balanced, found, made, facts: dict, recol
 
     left = facts["residual"]
     words = (
-        f"{facts['albedo']}, {facts['size'][0]} x {facts['size'][1]}, read as {facts['encoding']}; CIEDE2000 left: median "
-        f"{left['delta_e00_median']:.2f}, p95 {left['delta_e00_p95']:.2f}; out of reach {left['out_of_reach_share']:.1%}"
+        f"{facts['albedo']}, {facts['size'][0]} x {facts['size'][1]}, read as {facts['encoding']}; CIEDE2000 left: "
+        f"median {left['delta_e00_median']:.2f}, p95 {left['delta_e00_p95']:.2f}; "
+        f"out of reach {left['out_of_reach_share']:.1%}"
     )
     name = facts["target"]["named"] if facts["target"] else ""
     map_preview.draw(luts, balanced, found, made, words, recolored, name).save(path, compress_level=3)
@@ -155,8 +155,8 @@ def _text(result: dict, options: Namespace) -> str:
     ]  # fmt: skip
     if options.format == "png" and left["beyond_png_ratio_share"] > 0:
         lines.append(
-            f"{left['beyond_png_ratio_share']:.2%} of texels have more than {maps.RATIO_RANGE:g} times the median, which "
-            "is the most that PNG holds; --format exr keeps them"
+            f"{left['beyond_png_ratio_share']:.2%} of texels have more than {maps.RATIO_RANGE:g} times the median, the "
+            "most that PNG holds; --format exr keeps them"
         )
     lines.append(", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
                  + f"; inverted in {result['invert_us_per_pixel']:.2f} µs a pixel")  # fmt: skip
