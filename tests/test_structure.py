@@ -17,7 +17,7 @@ LEVELS = [
     {"cli"},
     {"commands"},
     {"benchmark", "checking"},
-    {"charts", "exports"},
+    {"charts", "exports", "render"},
     {"baking"},
     {"solvers"},
     {"painting"},
