@@ -113,9 +113,15 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--force", action="store_true", help="replace an existing folder")
     export.set_defaults(run="lutgen.commands.sets.export")
 
+    compare = commands.add_parser("compare", help="how far two pictures of a scene are apart, without their noise")
+    compare.add_argument("a", metavar="A", help="EXR that `lutgen render` or `lutgen view` wrote, or any picture")
+    compare.add_argument("b", metavar="B", help="picture of the same size")
+    compare.add_argument("--png", metavar="FILE", help="write A, B and the map of differences side by side")
+    compare.set_defaults(run="lutgen.commands.compare.compare")
+
     for command in (bake, swatch, bench):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability, view, sheet, export):
+    for command in (bake, swatch, info, devices, check, bench, figures, chart, stability, view, sheet, export, compare):
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

@@ -126,6 +126,16 @@ def encode_srgb(linear) -> np.ndarray:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
+def decode_srgb(encoded) -> np.ndarray:
+    """Linear sRGB of display-encoded sRGB in 0 to 1 (IEC 61966-2-1).
+
+    >>> round(float(decode_srgb(0.4614)), 4)
+    0.18
+    """
+    encoded = np.asarray(encoded, float)
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
+
 def hex_code(linear_srgb) -> str:
     """The #rrggbb code of one linear sRGB color [3].
 
