@@ -58,7 +58,7 @@ inline float3 surroundings(const scene_t *s, float3 d) {
     float down = row - top, right = column - left;
     int first = left < 0 ? left + columns : left >= columns ? left - columns : left, next = first + 1 == columns ? 0 : first + 1;
     __global const float4 *a = s->environment_map + top * columns, *b = a + (rows > 1 ? columns : 0);
-    return mix(mix(a[first], a[next], right), mix(b[first], b[next], right), down).xyz;
+    return view->environment * mix(mix(a[first], a[next], right), mix(b[first], b[next], right), down).xyz;
 }
 
 // Where light rays start: off the round surface, so that no triangle shades itself or its neighbors.

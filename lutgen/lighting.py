@@ -7,6 +7,8 @@ from functools import cache
 import numpy as np
 
 REFRACTIVE_INDEX = 1.4
+SECOND_LOBE, SECOND_WEIGHT = 0.55, 0.2
+"""Roughness of the sharper of both specular lobes relative to the other, and its share."""
 STUDIO = (  # direction, sharpness, color times strength
     ((-0.55, 0.60, 0.58), 14.0, (3.00, 2.90, 2.75)),
     ((0.90, 0.20, 0.40), 10.0, (0.78, 0.80, 0.82)),
