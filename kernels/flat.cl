@@ -89,16 +89,17 @@ inline float3 radiance(const scene_t *s, const exits_t *exits, hit_t hit, float3
     }
 }
 
-// Samples of pixels: to each pixel's moments add the sums of color, skin and products of colors. Work-item i takes
-// PIXELS pixels from i PIXELS on; random streams belong to pixel and sample, so launches may be cut anywhere.
-__kernel void flat(SCENE, EXITS, uint end, uint first_sample, uint samples, __global float *moments,
+// Samples of pixels, added to their moments one by one. Work-item i takes PIXELS pixels from begin + i PIXELS on; random
+// streams belong to pixel and sample, so launches may be cut anywhere.
+__kernel void flat(SCENE, EXITS, uint begin, uint end, uint first_sample, uint samples, __global float *moments,
                    __global uint *tallies) {
     const scene_t scene = SCENE_HERE, *s = &scene;
     const exits_t exits = EXITS_HERE;
     uint tally[TALLIES] = {0};
-    const uint from = get_global_id(0) * PIXELS, to = min(from + PIXELS, end);
+    const uint from = begin + get_global_id(0) * PIXELS, to = min(from + PIXELS, end);
     for (uint pixel = from; pixel < to; pixel++) {
-        float sums[MOMENTS] = {0};
+        float sums[MOMENTS];
+        for (int m = 0; m < MOMENTS; m++) sums[m] = moments[pixel * MOMENTS + m];
         for (uint i = first_sample; i < first_sample + samples; i++) {
             rng_t rng = start_streams(s->view->seed, pixel, i);
             float x = pixel % s->view->columns + next_uniform(&rng), y = pixel / s->view->columns + next_uniform(&rng);
@@ -109,7 +110,7 @@ __kernel void flat(SCENE, EXITS, uint end, uint first_sample, uint samples, __gl
             tally[HITS]++;
             add_sample(sums, radiance(s, &exits, hit, d, &rng, tally), tally);
         }
-        for (int m = 0; m < MOMENTS; m++) moments[pixel * MOMENTS + m] += sums[m];
+        for (int m = 0; m < MOMENTS; m++) moments[pixel * MOMENTS + m] = sums[m];
     }
     for (int i = 0; i < TALLIES; i++) tallies[get_global_id(0) * TALLIES + i] += tally[i];
 }

@@ -21,6 +21,10 @@ PLAIN = {"chromophore": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0), "
          "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
 """What stands for a map that is not given, as in the viewer; a map's missing channels are 1."""
 WAVE = 10
+BASE = "lanes", "rng", "trace", "scene", "light", "moments"
+TALLIES = ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS", "HITS", "BACKS", "MISSES", "REJECTED", "BOUNCES", "BROKEN")
+"""What kernels count: rays by kind (the first four), camera rays that met skin, on back faces; exits without a surface or
+on one that faces away; paths from skin to skin; samples that were not finite."""
 STUDIO_ROWS, MOST_ROWS = 256, 1024
 _LOBES, _EXIT_MEANS = lighting.ggx_albedo().shape[0], len(lighting.exit_means())
 
@@ -82,19 +86,18 @@ def open_stage(
     return Stage(device, luts, view, tuple(ocl.buffer(device, values) for values in arrays), width)
 
 
-def source(stage: Stage, *names: str, structs: tuple = ()) -> str:
-    """The text of kernels over the stage: one lane per work-item, rays against `stage.width` boxes at a time."""
-    f0 = float(lighting.fresnel(np.ones(1))[0])
-    constants = {"F0": f0, "SECOND_LOBE": lighting.SECOND_LOBE, "SECOND_WEIGHT": lighting.SECOND_WEIGHT}
-    defined = "".join(f"#define {name} {value:.9g}f\n" for name, value in constants.items())
-    declared = ocl.struct_source(stage.device, (("view_t", VIEW), *structs))
-    return defined + declared + ocl.source("lanes", "rng", "trace", "scene", "light", *names)
-
-
-def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constants: int):
-    """A built kernel over the stage, of files that come after scene.cl and light.cl."""
-    fixed = {"W": 1, "WIDTH": stage.width, "LOBES": _LOBES, "EXIT_MEANS": _EXIT_MEANS, "WAVES": len(stage.luts.weights)}
-    return ocl.kernel(stage.device, entry, source(stage, *names, structs=structs), fixed | constants)
+def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constants: float):
+    """A built kernel over the stage: of the files named and those that they build on, one lane per work-item."""
+    fixed = {
+        "W": 1, "WIDTH": stage.width, "WAVES": len(stage.luts.weights), "LOBES": _LOBES, "EXIT_MEANS": _EXIT_MEANS,
+        "F0": float(lighting.fresnel(np.ones(1))[0]), "SECOND_LOBE": lighting.SECOND_LOBE,
+        "SECOND_WEIGHT": lighting.SECOND_WEIGHT, "ENTRY": stage.luts.paths.entry,
+        **{name: number for number, name in enumerate(TALLIES)}, "TALLIES": len(TALLIES),
+    }  # fmt: skip
+    text = ocl.struct_source(stage.device, (("view_t", VIEW), *structs)) + ocl.source(*BASE, *names)
+    whole = {name: value for name, value in (fixed | constants).items() if isinstance(value, int)}
+    reals = {name: value for name, value in (fixed | constants).items() if isinstance(value, float)}
+    return ocl.kernel(stage.device, entry, "".join(f"#define {n} {v:.9g}f\n" for n, v in reals.items()) + text, whole)
 
 
 def waves(luts: LutSet, oxygenation: float) -> np.ndarray:
