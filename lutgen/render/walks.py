@@ -1,0 +1,75 @@
+"""Ways to take samples of a picture: each opens on a stage and then adds samples of pixels to their moments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from lutgen import device as ocl
+from lutgen.render import exits, stage
+from lutgen.render.stage import Stage
+
+MOMENTS = 10
+PIXELS = {"cpu": 64, "gpu": 1}
+"""Pixels that one work-item takes in turn."""
+REACH = 1.5
+"""How far above and below the tangent plane an exit is looked for, in units of its distance."""
+
+
+class Walk(Protocol):
+    """An opened way to take samples.
+
+    `group`: samples that make one whole estimate; counts of samples are multiples of it. `facts`: for the manifest.
+    """
+
+    group: int
+    facts: dict
+
+    def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
+        """Add samples first ... first + samples - 1 of the pixels begin ... end - 1 to the buffers of moments
+        [pixels, 10] f4 and of tallies [items, TALLIES] u4; `items(stage, end - begin)` rows of it are used."""
+
+
+def items(stage: Stage, pixels: int) -> int:
+    """Work-items for that many pixels."""
+    return -(-pixels // PIXELS["gpu" if stage.device.kind == "gpu" else "cpu"])
+
+
+@dataclass
+class Flat:
+    """Flat walks drawn from path tables (kernels/flat.cl)."""
+
+    stage: Stage
+    kernel: object
+    tables: tuple
+    facts: dict
+    group: int = 1
+
+    def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
+        numbers = (np.uint32(v) for v in (begin, end, first, samples))
+        shape = (items(self.stage, end - begin),)
+        ocl.launch(self.stage.device, self.kernel, shape, *self.stage.arguments, *self.tables, *numbers, moments, tallies)
+
+
+def flat(on: Stage, seed: int = 0, photons: int = exits.EXITS) -> Flat:
+    """Trace the exits of the stage's skin and open the flat walk over them."""
+    skin = tuple(float(v) for v in on.view["chromophores"])
+    found = exits.trace(on.device, on.luts, skin, photons, seed)
+    built = stage.kernel(
+        on, "flat", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1], SECTORS=exits.SECTORS,
+        LEAST_COSINE=float(found.cosines[0]), REACH=REACH, PIXELS=PIXELS["gpu" if on.device.kind == "gpu" else "cpu"],
+    )  # fmt: skip
+    color, sigma = found.color(on.luts, skin)
+    facts = {
+        "walk": "flat", "exits_per_wavelength_and_angle": photons, "angles": len(found.cosines),
+        "rings": len(found.radius_edges_mm) - 1, "sectors": exits.SECTORS, "events": found.events,
+        "color_acescg": color.tolist(), "color_std_error_acescg": sigma.tolist(), "reach": REACH,
+    }  # fmt: skip
+    return Flat(on, built, exits.buffers(on.device, found), facts)
+
+
+WALKS: dict[str, Callable[..., Walk]] = {"flat": flat}
+"""By the name that --walk takes."""
