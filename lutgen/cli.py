@@ -98,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--preset", help="chromophores of a preset: light, dark, ...")
         command.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one value of the look")
         command.add_argument("--size", default=None, help="pixels: 640x360")
-    view.add_argument("--screenshot", metavar="FILE", help="picture to write instead of opening a window")
+    view.add_argument("--screenshot", metavar="FILE", help="picture to write instead of a window; .exr: linear")
     view.set_defaults(run="lutgen.commands.pictures.view")
     sheet.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
     sheet.set_defaults(run="lutgen.commands.pictures.sheet")

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import lutgen
-from lutgen import head, lighting, painting, scene, subject
+from lutgen import exr, head, lighting, painting, scene, subject
 from lutgen.cli import main
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -92,6 +92,27 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
     found = linear(plain, look)[140:180, 140:180]
     expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
     assert np.abs(found / expected - 1).max() < 0.005
+
+
+def test_an_exr_holds_the_radiance_behind_the_picture(plain, stage, tmp_path):
+    """Light of irradiance pi along the normal leaves a plane with the LUT's color, whatever the exposure."""
+    look = Look(entry=0, environment=0, light=np.pi, light_azimuth=0, light_elevation=0, azimuth=0, elevation=0,
+                distance_mm=300, exposure=3, transmission=0, specular=0, tier="reference")  # fmt: skip
+    app.screenshot(plain, look, tmp_path / "plane.EXR")
+    found = exr.read(tmp_path / "plane.EXR")["view"]
+    expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
+    assert np.abs(found.stack("RGB")[70:90, 70:90] / expected - 1).max() < 0.005
+    assert np.all(found.channels["skin"] == 1)
+    assert found.attributes["look"]["exposure"] == 3
+    app.screenshot(stage, LOOK, tmp_path / "face.exr")
+    face = exr.read(tmp_path / "face.exr")["view"]
+    skin, shown = face.channels["skin"], app.picture(stage, LOOK) @ np.array([0.2126, 0.7152, 0.0722])
+    light = lutgen.color.encode_srgb(face.stack("RGB") @ np.array([0.2126, 0.7152, 0.0722]))
+    assert np.array_equal(np.unique(skin), [0, 0.25, 0.5, 0.75, 1])
+    assert np.corrcoef(light[skin == 1], shown[skin == 1])[0, 1] > 0.98
+    assert np.all(face.stack("RGB")[skin == 0] == 0)
+    with pytest.raises(lutgen.InputError, match=r"picture = .*no.x\.exr: cannot be written"):
+        app.screenshot(stage, LOOK, tmp_path / "no" / "x.exr")
 
 
 def test_a_painted_albedo_is_recolored():

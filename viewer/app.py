@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from lutgen import scene, subject
+from lutgen import exr, scene, subject
 from lutgen.errors import InputError, cannot_write
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
@@ -34,6 +35,19 @@ def picture(stage: stages.Stage, look: Look) -> np.ndarray:
     """One frame as 8-bit sRGB [height, width, 3], first row on top."""
     passes.draw(stage, look)
     return passes.pixels(stage)
+
+
+def screenshot(stage: stages.Stage, look: Look, path: Path | str) -> None:
+    """Draw a look and write it: to an EXR as radiance, before exposure and tone curve, else as the display shows it."""
+    if Path(path).suffix.lower() != ".exr":
+        return write(picture(stage, look), path)
+    passes.draw(stage, look)
+    light, skin = passes.radiance(stage)
+    channels = exr.rgb(light.astype("f4")) | {"skin": skin.astype("f4")}
+    try:
+        exr.write(Path(path), [exr.Part("view", channels, {"look": asdict(look), "size": list(stage.size)})])
+    except OSError as error:
+        raise cannot_write("picture", path, error) from error
 
 
 def sheet(stage: stages.Stage, look: Look, columns: int = 3, progress: Callable = lambda name: None) -> np.ndarray:

@@ -12,7 +12,7 @@ from lutgen.errors import in_range
 from lutgen.scene import Look
 
 from . import clock, gl, sides, stages
-from .stages import SAMPLES, Stage
+from .stages import REFLECTED, SAMPLES, Stage
 
 TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
 REFERENCE_FRAMES = 16
@@ -168,3 +168,18 @@ def compose(stage: Stage, scattered: str, reflected: str, exposure: float) -> No
 def pixels(stage: Stage) -> np.ndarray:
     """The frame as 8-bit sRGB [height, width, 3], first row on top."""
     return gl.read(stage.targets["pixel_buffer"], kind="f1", components=3)[::-1]
+
+
+def radiance(stage: Stage) -> tuple[np.ndarray, np.ndarray]:
+    """The frame before exposure and tone curve: ACEScg [height, width, 3] and share of skin, first row on top.
+
+    Scattered and reflected light of a pixel's samples averaged; a sample beside the head counts as black.
+    """
+    scattered = gl.read(stage.targets["scattered_buffer"]).astype("f8")
+    mirrored = gl.read(stage.targets["surface_buffer"], attachment=REFLECTED, kind="f2").astype("f8")
+    frames = scattered[..., 3:]
+    light = np.where(frames > 0, scattered[..., :3] / np.maximum(frames, 1) + mirrored[..., :3], 0.0)
+    whole = np.concatenate([light, frames > 0], axis=-1)
+    width, height = stage.size
+    whole = whole.reshape(height, SAMPLES, width, SAMPLES, 4).mean(axis=(1, 3))[::-1]
+    return whole[..., :3], whole[..., 3]

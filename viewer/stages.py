@@ -16,6 +16,9 @@ from . import clock, gl, light, sides
 SHADOW_SIZE = 1024
 SAMPLES = 2
 """Pixels shaded along x and y for one shown."""
+LAYERS = "entering", "facing", "skin", "reflected", "detail"
+"""What the surface pass writes, by attachment (viewer/shaders/surface.frag.glsl)."""
+REFLECTED = LAYERS.index("reflected")
 _MAPS = ("normal", "chromophores", "surface", "detail")
 _PLAIN = {"normal": (0.5, 0.5, 1.0, 1.0), "chromophores": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0),
           "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
@@ -113,8 +116,7 @@ def resize(stage: Stage, size: tuple[int, int]) -> None:
     """Make the targets of a frame of that size in pixels."""
     gl.free(*stage.targets.values())
     context, large = gl.context(), (size[0] * SAMPLES, size[1] * SAMPLES)
-    names = "entering", "facing", "skin", "reflected", "detail"
-    layers = {name: gl.texture(large, 4, "f4" if name in ("entering", "skin") else "f2") for name in names}
+    layers = {name: gl.texture(large, 4, "f4" if name in ("entering", "skin") else "f2") for name in LAYERS}
     depth = context.depth_renderbuffer(large)
     cast = context.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
     cast.compare_func = ""

@@ -79,7 +79,7 @@ def view(options: Namespace) -> Outcome:
         look = extras.viewer("window").run(opened, look, size, notes)
         return {"look": asdict(look), "notes": list(notes)}, "\n".join(notes) or "closed", 0
     with _stage(opened, size) as stage:
-        app.write(app.picture(stage, look), options.screenshot)
+        app.screenshot(stage, look, options.screenshot)
     said = {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": list(notes)}
     return said, "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *notes]), 0
 

@@ -157,6 +157,7 @@ def _metric(lab: np.ndarray) -> np.ndarray:
     """Metric [N, 3, 3] of CIEDE2000 at colors [N, 3]: squared differences of small steps along axes and diagonals."""
 
     def squared(step) -> np.ndarray:
+        """Squared difference per squared length of a step."""
         half = _STEP / 2 * np.asarray(step, float)
         return (color.delta_e00(lab - half, lab + half) / _STEP) ** 2
 
