@@ -102,11 +102,11 @@ def test_an_exr_holds_the_radiance_behind_the_picture(plain, stage, tmp_path):
     found = exr.read(tmp_path / "plane.EXR")["view"]
     expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
     assert np.abs(found.stack("RGB")[70:90, 70:90] / expected - 1).max() < 0.005
-    assert np.all(found.channels["skin"] == 1)
+    assert np.all(found.channels["mask"] == 1)
     assert found.attributes["look"]["exposure"] == 3
     app.screenshot(stage, LOOK, tmp_path / "face.exr")
     face = exr.read(tmp_path / "face.exr")["view"]
-    skin, shown = face.channels["skin"], app.picture(stage, LOOK) @ np.array([0.2126, 0.7152, 0.0722])
+    skin, shown = face.channels["mask"], app.picture(stage, LOOK) @ np.array([0.2126, 0.7152, 0.0722])
     light = lutgen.color.encode_srgb(face.stack("RGB") @ np.array([0.2126, 0.7152, 0.0722]))
     assert np.array_equal(np.unique(skin), [0, 0.25, 0.5, 0.75, 1])
     assert np.corrcoef(light[skin == 1], shown[skin == 1])[0, 1] > 0.98

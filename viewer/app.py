@@ -43,7 +43,7 @@ def screenshot(stage: stages.Stage, look: Look, path: Path | str) -> None:
         return write(picture(stage, look), path)
     passes.draw(stage, look)
     light, skin = passes.radiance(stage)
-    channels = exr.rgb(light.astype("f4")) | {"skin": skin.astype("f4")}
+    channels = exr.rgb(light.astype("f4")) | {"mask": skin.astype("f4")}
     try:
         exr.write(Path(path), [exr.Part("view", channels, {"look": asdict(look), "size": list(stage.size)})])
     except OSError as error:

@@ -9,10 +9,9 @@ difference, so that
 
     e = ΔE00(A, B)^2 - trace(M C)
 
-has the true squared difference as its mean. C comes from the standard errors in the files: variances of independent
-pixels add up, and C = J S J' with J the derivative of Lab. Noise of R, G and B goes together (one path carries light of
-all of them, and ACEScg's channels share wavelengths), so S needs correlations, which no file holds: they are those of
-what is left of A - B within boxes, over the boxes where that is no more than noise.
+has the true squared difference as its mean. C comes from the files: pixels err independently, so that their covariances
+add up over a box, and C = J S J' with J the derivative of Lab and S the box's covariance in ACEScg. (Channels err
+together, as one path carries light of all of them: without S's mixed terms the trace would be up to three times off.)
 
 A box's difference is the root of e with e's sign, so that noise nearly cancels in a mean: of pictures that differ in
 nothing else it leaves about -0.2 of what it was, and a spread, which a p95 keeps. Both are drawn from C and reported.
@@ -77,33 +76,43 @@ def compare(a: Picture, b: Picture) -> Difference:
         raise InputError(f"{a.name}, {b.name}: no box of {BOX} x {BOX} pixels is skin by half; render them larger")
     count = n[full][:, None]
     means = [_boxed(one.acescg * seen[..., None])[full] / count for one in (a, b)]
-    silent = [one.name for one in (a, b) if one.sigma is None]
-    variance = sum((one.sigma**2 for one in (a, b) if one.sigma is not None), np.zeros_like(a.acescg))
+    silent = [one.name for one in (a, b) if one.covariance is None]
     notes += (*a.notes, *b.notes, *(f"{name}: holds no sigma, so its noise counts as difference" for name in silent))
-    summed = _boxed(variance * seen[..., None])[full]
-    correlation, scatter = _correlation(b.acescg - a.acescg, seen, full, summed, count)
+    covariance = sum((one.covariance for one in (a, b) if one.covariance is not None), np.zeros((*seen.shape, 3, 3)))
+    summed = _boxed((covariance * seen[..., None, None]).reshape(*seen.shape, 9))[full].reshape(-1, 3, 3)
 
     labs = [color.lab(mean @ _XYZ_FROM_ACESCG.T) for mean in means]
     middle = (means[0] + means[1]) / 2
     J = _lab_derivative(middle)
     metric = np.einsum("nia,nij,njb->nab", J, _metric(color.lab(middle @ _XYZ_FROM_ACESCG.T)), J)
-    spread = np.sqrt(summed) / count
-    noise = np.einsum("nab,ab,na,nb->n", metric, correlation, spread, spread)
+    S = summed / count[..., None] ** 2
+    noise = np.einsum("nab,nab->n", metric, S)
     squared = color.delta_e00(*labs) ** 2
     found = _signed_root(squared - noise)
-    sigmas, alone = _drawn(squared, means[1] - means[0], metric, noise, spread, correlation)
+    sigmas, alone = _drawn(squared, means[1] - means[0], metric, S)
 
     image = np.full(full.shape, np.nan)
     image[full] = found
     values = found.mean(), np.median(found), np.quantile(found, 0.95)
-    light = np.sqrt(np.einsum("na,nb,ab,na,nb->n", J[:, 0], J[:, 0], correlation, spread, spread).sum()) / len(found)
+    light = np.sqrt(np.einsum("na,nb,nab->", J[:, 0], J[:, 0], S)) / len(found)
     total = [one.acescg[seen].sum(axis=0) for one in (a, b)]
-    gain, gain_sigma = (v / np.maximum(total[0], 1e-12) for v in (total[1], np.sqrt(variance[seen].sum(axis=0))))
+    error = np.sqrt(np.diag(covariance[seen].sum(axis=0)))
+    gain, gain_sigma = (v / np.maximum(total[0], 1e-12) for v in (total[1], error))
     mean, median, p95 = (Figure(float(v), s) for v, s in zip(values, sigmas, strict=True))
     lightness = Figure(float((labs[1] - labs[0])[:, 0].mean()), float(light))
     channels = tuple(Figure(float(g) - 1, float(s)) for g, s in zip(gain, gain_sigma, strict=True))
     return Difference(
-        image, len(found), mean, median, p95, float(found.max()), alone, lightness, channels, scatter, notes
+        image,
+        len(found),
+        mean,
+        median,
+        p95,
+        float(found.max()),
+        alone,
+        lightness,
+        channels,
+        _scatter(b.acescg - a.acescg, seen, full, summed, count),
+        notes,
     )
 
 
@@ -118,31 +127,15 @@ def _signed_root(squared: np.ndarray) -> np.ndarray:
     return np.sign(squared) * np.sqrt(np.abs(squared))
 
 
-def _correlation(
+def _scatter(
     difference: np.ndarray, seen: np.ndarray, full: np.ndarray, summed: np.ndarray, count: np.ndarray
-) -> tuple[np.ndarray, float | None]:
-    """Correlations [3, 3] of the channels' noise, and scatter over sigma, from pixels less their box's mean.
-
-    Boxes count whose scatter is less than 3 times the variance that sigma says: elsewhere the pictures differ.
-    """
-    pairs = np.stack([difference[..., i] * difference[..., j] for i in range(3) for j in range(3)], axis=-1)
-    first = _boxed(difference * seen[..., None])[full]
-    within = (
-        _boxed(pairs * seen[..., None])[full].reshape(-1, 3, 3) - first[:, :, None] * first[:, None] / count[..., None]
-    )
-    expected = summed * (1 - 1 / count)
+) -> float | None:
+    """Scatter of pixels around their box's mean over what sigma says: median over boxes of the root of their ratio."""
+    first, second = (_boxed(difference**power * seen[..., None])[full] for power in (1, 2))
+    expected = np.einsum("nii->ni", summed) * (1 - 1 / count)
     noisy = np.all(expected > 0, axis=1)
-    if not noisy.any():
-        return np.eye(3), None
-    ratio = np.einsum("nii->ni", within)[noisy] / expected[noisy]
-    plain = np.all(ratio < 3, axis=1)
-    scatter = float(np.sqrt(np.median(ratio)))
-    if plain.sum() < BOX * BOX:
-        return np.eye(3), scatter
-    root = np.sqrt(expected[noisy][plain])
-    pooled = (within[noisy][plain] / (root[:, :, None] * root[:, None])).mean(axis=0)
-    size = np.sqrt(np.diag(pooled))
-    return pooled / np.outer(size, size), scatter
+    ratio = (second - first**2 / count)[noisy] / expected[noisy]
+    return float(np.sqrt(np.median(ratio))) if noisy.any() else None
 
 
 def _lab_derivative(acescg: np.ndarray) -> np.ndarray:
@@ -171,22 +164,20 @@ def _metric(lab: np.ndarray) -> np.ndarray:
     return metric
 
 
-def _drawn(
-    squared: np.ndarray, step: np.ndarray, metric: np.ndarray, noise: np.ndarray, spread: np.ndarray,
-    correlation: np.ndarray,
-) -> tuple[tuple, tuple]:  # fmt: skip
+def _drawn(squared: np.ndarray, step: np.ndarray, metric: np.ndarray, S: np.ndarray) -> tuple[tuple, tuple]:
     """Standard errors of mean, median and p95 of the boxes, and the same three figures of noise alone.
 
     Noise is drawn from its covariance and, for the errors, added once more to what was found.
     """
+    noise = np.einsum("nab,nab->n", metric, S)
     if not noise.any():
         return (0.0,) * 3, (0.0,) * 3
     rng = np.random.default_rng(0)
-    values, vectors = np.linalg.eigh(correlation)
-    root = vectors * np.sqrt(np.maximum(values, 0))
+    values, vectors = np.linalg.eigh(S)
+    root = vectors * np.sqrt(np.maximum(values, 0))[:, None]
     with_noise, alone = [], []
     for _ in range(_DRAWS):
-        drawn = rng.standard_normal(spread.shape) @ root.T * spread
+        drawn = np.einsum("nab,nb->na", root, rng.standard_normal(step.shape))
         own = np.einsum("na,nab,nb->n", drawn, metric, drawn)
         across = 2 * np.einsum("na,nab,nb->n", step, metric, drawn)
         with_noise.append(_figures(_signed_root(squared + across + own - 2 * noise)))

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import color
+from lutgen import color, exr
 from lutgen.errors import InputError
+from lutgen.render import picture as rendered
 
 COVERED = 0.99
 """Share of a pixel that must be skin for it to count: outlines, which every renderer filters in its own way, do not."""
@@ -17,14 +18,14 @@ COVERED = 0.99
 
 @dataclass(frozen=True)
 class Picture:
-    """Linear ACEScg [rows, columns, 3], its standard error or None, and its share of skin [rows, columns] or None.
+    """Linear ACEScg [rows, columns, 3], covariance of its noise [rows, columns, 3, 3] or None, share of skin or None.
 
     `notes`: what was taken for granted.
     """
 
     name: str
     acescg: np.ndarray
-    sigma: np.ndarray | None
+    covariance: np.ndarray | None
     skin: np.ndarray | None
     notes: tuple[str, ...] = ()
 
@@ -32,15 +33,16 @@ class Picture:
 def read(path: Path | str) -> Picture:
     """A picture from its file, first row on top.
 
-    EXR: R, G and B linear, in ACEScg where the file says so, else Rec. 709; `sigma.R`, `sigma.G`, `sigma.B` their
-    standard errors; `skin`, or else A, the mask. Other formats: 8-bit sRGB, A the mask. Raises InputError for a file
-    that is missing or no picture, and for NaN or infinite values.
+    EXR: R, G and B linear, in ACEScg where the file says so, else Rec. 709; `mask`, or else A, the share of skin; noise
+    from the moments that `lutgen render` keeps, or from `sigma.R`, `sigma.G`, `sigma.B` as if channels erred each by
+    itself. Other formats: 8-bit sRGB, A the share of skin. Raises InputError for a file that is missing or no picture,
+    and for NaN or infinite values.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"picture {path}: there is no such file")
     found = _exr(path) if path.suffix.lower() == ".exr" else _display(path)
-    for what, values in (("", found.acescg), (" in sigma", found.sigma), (" in skin", found.skin)):
+    for what, values in (("", found.acescg), (" in its noise", found.covariance), (" in its mask", found.skin)):
         broken = np.zeros((1, 1), bool) if values is None else ~np.isfinite(values)
         if broken.any():
             row, column = np.argwhere(broken)[0][:2]
@@ -48,14 +50,10 @@ def read(path: Path | str) -> Picture:
                 f"picture {path}: holds {int(broken.sum())} NaN or infinite values{what}, the first at row {row}, "
                 f"column {column}; render it anew"
             )
-    if found.sigma is not None and found.sigma.min() < 0:
-        raise InputError(f"picture {path}: holds a negative sigma, {found.sigma.min():g}; render it anew")
     return found
 
 
 def _exr(path: Path) -> Picture:
-    from lutgen import exr
-
     try:
         part = next(iter(exr.read(path).values()))
     except InputError as error:
@@ -65,18 +63,28 @@ def _exr(path: Path) -> Picture:
     if not set("RGB") <= set(channels) or len(shapes) != 1:
         raise InputError(f"picture {path}: has channels {', '.join(channels)}; R, G and B of one size are needed")
     rgb = part.stack("RGB").astype("f8")
-    ours = np.allclose(part.chromaticities, exr.ACESCG, atol=1e-4)
+    skin = next((channels[name].astype("f8") for name in ("mask", "A") if name in channels), None)
+    if np.allclose(part.chromaticities, exr.ACESCG, atol=1e-4):
+        covariance, notes = _noise(part, rgb, path)
+        return Picture(path.name, rgb, covariance, skin, notes)
+    if not np.allclose(part.chromaticities, exr.REC709, atol=1e-4):
+        raise InputError(f"picture {path}: has other primaries than ACEScg and Rec. 709; convert it")
+    return Picture(path.name, _acescg(rgb), None, skin)
+
+
+def _noise(part: exr.Part, rgb: np.ndarray, path: Path) -> tuple[np.ndarray | None, tuple[str, ...]]:
+    """Covariance of a picture's pixels, and what has to be said about it."""
+    if "render" in part.attributes:
+        made = rendered.read(path)
+        guessed = (f"{path.name}: of one sample, so its noise is a guess",)
+        return made.covariance(), () if made.estimates > 1 else guessed
     names = [f"sigma.{name}" for name in "RGB"]
-    sigma = np.stack([channels[n] for n in names], axis=-1).astype("f8") if set(names) <= set(channels) else None
-    notes = ()
-    if not ours:
-        if not np.allclose(part.chromaticities, exr.REC709, atol=1e-4):
-            raise InputError(f"picture {path}: has other primaries than ACEScg and Rec. 709; convert it")
-        rgb = _acescg(rgb)
-        if sigma is not None:
-            sigma, notes = None, (f"{path.name}: its sigma is of Rec. 709 channels and left out",)
-    skin = next((channels[name].astype("f8") for name in ("skin", "A") if name in channels), None)
-    return Picture(path.name, rgb, sigma, skin, notes)
+    if not set(names) <= set(part.channels):
+        return None, ()
+    sigma = np.stack([part.channels[name] for name in names], axis=-1).astype("f8")
+    covariance = np.zeros((*sigma.shape, 3))
+    covariance[..., range(3), range(3)] = sigma**2
+    return covariance, (f"{path.name}: noise of its channels is taken to be independent",)
 
 
 def _display(path: Path) -> Picture:
