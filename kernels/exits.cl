@@ -1,5 +1,5 @@
-// The flat walk by drawing: where light that enters at a hit leaves the flat skin, found on the real surface, and with
-// how much of each wavelength (lutgen/render/exits.py).
+// The flat walk by drawing: where light that enters leaves the flat skin, and with how much of each wavelength
+// (lutgen/render/exits.py).
 #define EXITS __global const float *exit_edges, __global const float *exit_sums, __global const float *exit_energy, \
     __global const uint2 *exit_places, __global const half *exit_records
 #define EXITS_HERE {exit_edges, exit_sums, exit_energy, exit_places, exit_records}
@@ -28,7 +28,7 @@ inline float2 draw_exit(const scene_t *s, const exits_t *exits, float c, rng_t *
     }
     const int ring = low / SECTORS, sector = low % SECTORS, row = (a * CELLS + low) * WAVES;
     const float inner = exits->edges[ring], outer = exits->edges[ring + 1], along = next_uniform(rng);
-    float radius = ring ? inner * pow(outer / inner, along) : outer * sqrt(along);
+    float radius = ring ? inner * exp(log(outer / inner) * along) : outer * sqrt(along);
     float azimuth = (sector + next_uniform(rng)) * (M_PI_F / SECTORS), which = next_uniform(rng);
     if (next_bits(rng) & SIGN_BIT) azimuth = -azimuth;
     for (int k = 0; k < WAVES; k++) {
@@ -37,25 +37,4 @@ inline float2 draw_exit(const scene_t *s, const exits_t *exits, float c, rng_t *
         paths[k] = vload_half2(place.x + min((uint)(which * place.y), max(place.y, 1u) - 1u), exits->records);
     }
     return (float2)(radius, azimuth);
-}
-
-// The surface where light leaves, for an offset along the tangent plane at `here`: the first that a ray along the
-// plane's normal meets, from REACH times the offset above the plane to as far below it. Where there is none (a miss:
-// beyond an ear's rim), or it faces away (rejected: the far side of a thin part), the light leaves where it entered;
-// it is not lost. Offsets under 5 um are no farther than the tree resolves.
-inline surface_t exit_at(const scene_t *s, const surface_t *here, float3 offset, uint *tally) {
-    float radius = length(offset);
-    if (radius < 0.005f) return *here;
-    float reach = REACH * radius + 0.05f;
-    float3 n = here->smooth;
-    tally[PROBES]++;
-    hit_t hit = trace(here->position + offset + n * reach, -n, 0.0f, 2.0f * reach, false, TREE_OF(s));
-    if (hit.triangle < 0) {
-        tally[MISSES]++;
-        return *here;
-    }
-    surface_t there = surface_at(s, hit);
-    if (dot(there.smooth, n) > 0.0f && dot(there.geometric, n) > 0.0f) return there;
-    tally[REJECTED]++;
-    return *here;
 }

@@ -72,10 +72,10 @@ inline bool shaded(const scene_t *s, float3 o, float3 d) {
 inline float3 toward_sun(const scene_t *s, rng_t *rng) {
     __global const view_t *view = s->view;
     float3 way = view3(view->sun_direction), t, b;
-    float drop = view->sun_spread * next_uniform(rng), turn = 2.0f * M_PI_F * next_uniform(rng);
-    float sine = sqrt(drop * (2.0f - drop));
+    float drop = view->sun_spread * next_uniform(rng), sine = sqrt(drop * (2.0f - drop)), y, x;
+    uniform_azimuth(next_bits(rng), &y, &x);
     across(way, &t, &b);
-    return normalize(way * (1.0f - drop) + (t * cos(turn) + b * sin(turn)) * sine);
+    return normalize(way * (1.0f - drop) + (t * x + b * y) * sine);
 }
 
 // Sunlight that enters at a surface, relative to light along the normal, over pi: times a skin's color it is radiance.
@@ -97,11 +97,11 @@ inline float3 outward(float3 d, float3 n) {
 // A direction of density cosine over pi about the mapped normal, and what enters of the light from there.
 inline float3 toward_surroundings(const scene_t *s, const surface_t *here, rng_t *rng, float *enters) {
     float3 t, b, n = here->mapped;
-    float square = next_uniform(rng), turn = 2.0f * M_PI_F * next_uniform(rng), sine = sqrt(square);
-    float c = sqrt(1.0f - square);
+    float square = next_uniform(rng), sine = sqrt(square), c = sqrt(1.0f - square), y, x;
+    uniform_azimuth(next_bits(rng), &y, &x);
     across(n, &t, &b);
     *enters = entry_factor(s, c);
-    return outward(normalize(n * c + (t * cos(turn) + b * sin(turn)) * sine), here->smooth);
+    return outward(normalize(n * c + (t * x + b * y) * sine), here->smooth);
 }
 
 // A direction that one of the lobes reflects light from toward v, drawn by its visible facets (Heitz 2018), and the
@@ -112,8 +112,10 @@ inline float3 toward_reflection(const scene_t *s, const surface_t *here, float3 
     across(n, &t, &b);
     float nv = fmax(dot(n, v), 1e-3f);
     float3 out = normalize((float3)(alpha * dot(v, t), alpha * dot(v, b), nv));
-    float r = sqrt(next_uniform(rng)), turn = 2.0f * M_PI_F * next_uniform(rng), x = r * cos(turn), y = r * sin(turn);
-    float share = 0.5f * (1.0f + out.z);
+    float r = sqrt(next_uniform(rng)), share = 0.5f * (1.0f + out.z), y, x;
+    uniform_azimuth(next_bits(rng), &y, &x);
+    x *= r;
+    y *= r;
     float3 level = out.z < 0.9999f ? normalize((float3)(-out.y, out.x, 0.0f)) : (float3)(1.0f, 0.0f, 0.0f);
     float3 upright = cross(out, level);
     y = (1.0f - share) * sqrt(fmax(1.0f - x * x, 0.0f)) + share * y;

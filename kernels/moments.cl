@@ -2,7 +2,7 @@
 // the host has mean and covariance. A sample that is not finite is counted and left out, so no pixel becomes NaN.
 #define MOMENTS 10
 
-inline void add_sample(float *sums, float3 color, uint *tally) {
+inline void add_sample(__global float *sums, float3 color, float hits, uint *tally) {
     if (!all(isfinite(color))) {
         tally[BROKEN]++;
         color = 0.0f;
@@ -10,7 +10,7 @@ inline void add_sample(float *sums, float3 color, uint *tally) {
     sums[0] += color.x;
     sums[1] += color.y;
     sums[2] += color.z;
-    sums[3] += 1.0f;
+    sums[3] += hits;
     sums[4] += color.x * color.x;
     sums[5] += color.y * color.y;
     sums[6] += color.z * color.z;

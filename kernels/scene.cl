@@ -136,10 +136,8 @@ inline surface_t surface_at(const scene_t *s, hit_t hit) {
     here.rough = rougher(clamp(view->roughness * made.x, 0.15f, 1.0f), unseen);
     here.rough2 = rougher(clamp(view->roughness * made.x * SECOND_LOBE, 0.1f, 1.0f), unseen);
     here.gloss = view->specular * made.y;
-    float3 ratio = read_map(s->chromophore_map, view->chromophore_size, at).xyz;
-    ratio.x = pow(ratio.x, view->contrast[0]);
-    ratio.z = pow(ratio.z, view->contrast[1]);
-    here.skin = clamp(view3(view->chromophores) * ratio, view3(view->chromophores_low), view3(view->chromophores_high));
+    here.skin = view3(view->chromophores) * read_map(s->chromophore_map, view->chromophore_size, at).xyz;
+    here.skin = clamp(here.skin, view3(view->chromophores_low), view3(view->chromophores_high));
     here.detail = read_map(s->detail_map, view->detail_size, at).xyz;
     return here;
 }
@@ -150,6 +148,9 @@ inline float2 absorption(const scene_t *s, int k, float3 skin) {
     float melanin = mix(wave[1], wave[0], skin.y);
     return (float2)(mix(wave[2], melanin, skin.x) + wave[4], mix(wave[2], wave[3], skin.z) + wave[5]) - wave[6];
 }
+
+// ACEScg color of wavelength k.
+inline float3 color_weight(const scene_t *s, int k) { return view3(s->waves + k * WAVE + 7); }
 
 // The ray through a place of the picture in pixels, row 0 on top.
 inline float3 camera_ray(const scene_t *s, float column, float row) {

@@ -120,7 +120,9 @@ def trace(
             found.append(paths)
     if base > PHOTONS[1]:
         raise MachineError(f"exits: {base} records are more than 32 bits count; ask for fewer photons")
-    made = Exits(cosines, edges, np.zeros(0), count / photons, first, count, np.concatenate(found), photons, tally.events)
+    made = Exits(
+        cosines, edges, np.zeros(0), count / photons, first, count, np.concatenate(found), photons, tally.events
+    )
     return _with_importance(made, luts, skin)
 
 

@@ -21,7 +21,7 @@ PLAIN = {"chromophore": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0), "
          "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
 """What stands for a map that is not given, as in the viewer; a map's missing channels are 1."""
 WAVE = 10
-BASE = "lanes", "rng", "trace", "scene", "light", "moments"
+BASE = "lanes", "rng", "trace", "scene", "light", "paths", "moments"
 TALLIES = ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS", "HITS", "BACKS", "MISSES", "REJECTED", "BOUNCES", "BROKEN")
 """What kernels count: rays by kind (the first four), camera rays that met skin, on back faces; exits without a surface or
 on one that faces away; paths from skin to skin; samples that were not finite."""
@@ -31,7 +31,7 @@ _LOBES, _EXIT_MEANS = lighting.ggx_albedo().shape[0], len(lighting.exit_means())
 VIEW = np.dtype(
     [(name, "f4", (3,)) for name in ("eye", "forward", "right", "up", "sun_direction", "sun_color")]
     + [(name, "f4", (3,)) for name in ("chromophores", "chromophores_low", "chromophores_high")]
-    + [(name, "f4", (2,)) for name in ("contrast", "turn")]
+    + [("turn", "f4", (2,))]
     + [(f"{name}_size", "i4", (2,)) for name in PLAIN]
     + [
         (name, "f4")
@@ -73,9 +73,9 @@ def open_stage(
         in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
     width = max(device.lanes, 4)
     tree = bvh.build(shape.positions_mm, shape.triangles, width)
-    textures = {name: _texels(values, PLAIN[name]) for name, values in _named(subject.textures_of(given)).items()}
+    textures = {name: _texels(values, PLAIN[name]) for name, values in _named(given, look).items()}
     radiance = _surroundings(around)
-    view = _view(luts, given, look, size, textures, radiance, seed, bounces)
+    view = _view(luts, look, size, textures, radiance, seed, bounces)
     uv = np.zeros((len(shape.positions_mm), 2)) if shape.uv is None else shape.uv
     arrays = (
         tree.boxes, tree.children, tree.triangles, tree.numbers, view,
@@ -111,9 +111,18 @@ def waves(luts: LutSet, oxygenation: float) -> np.ndarray:
     return np.concatenate([np.stack(absorbed, axis=1), luts.weights], axis=1).astype("f4")
 
 
-def _named(textures: Mapping[str, np.ndarray]) -> dict[str, np.ndarray | None]:
-    """Maps by the kernels' names."""
-    return {name: textures.get("chromophores" if name == "chromophore" else name) for name in PLAIN}
+def _named(given: Maps, look: Look) -> dict[str, np.ndarray | None]:
+    """Maps by the kernels' names; the contrast of chromophores on the look's skin is in their ratios.
+
+    The viewer raises what it has read between texels, here the texels are raised: `pow` costs a fifth of a picture.
+    """
+    textures = subject.textures_of(given)
+    named = {name: textures.get("chromophores" if name == "chromophore" else name) for name in PLAIN}
+    ratios = named["chromophore"]
+    if ratios is not None:
+        melanin, hemoglobin = texture_maps.contrast(given.full_contrast_melanin, look.melanin)
+        named["chromophore"] = ratios.astype("f4") ** np.array([melanin, 1.0, hemoglobin], "f4")
+    return named
 
 
 def _texels(values: np.ndarray | None, plain: tuple[float, ...]) -> np.ndarray:
@@ -137,8 +146,7 @@ def _surroundings(around: np.ndarray | None) -> np.ndarray:
 
 
 def _view(
-    luts: LutSet, given: Maps, look: Look, size: tuple[int, int], textures: Mapping, radiance: np.ndarray, seed: int,
-    bounces: int,
+    luts: LutSet, look: Look, size: tuple[int, int], textures: Mapping, radiance: np.ndarray, seed: int, bounces: int
 ) -> np.ndarray:  # fmt: skip
     camera = scene.camera(look, *size)
     side, up, back = camera.view[:3, :3]
@@ -151,7 +159,6 @@ def _view(
         "sun_color": look.light * lighting.SUN, "sun_spread": 2 * np.sin(np.radians(look.light_size) / 2) ** 2,
         "chromophores": [getattr(look, a.name) for a in axes], "chromophores_low": [a.low for a in axes],
         "chromophores_high": [a.high for a in axes],
-        "contrast": texture_maps.contrast(given.full_contrast_melanin, look.melanin),
         "turn": (np.cos(turn), np.sin(turn)), "environment": look.environment if radiance.any() else 0.0,
         "roughness": look.roughness, "specular": look.specular, "bumps": look.bumps, "entry": look.entry,
         "pore_side_mm": pores.SIDE_MM, "columns": size[0], "rows": size[1], "pore_texels": pores.TEXELS,

@@ -51,7 +51,9 @@ class Flat:
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         numbers = (np.uint32(v) for v in (begin, end, first, samples))
         shape = (items(self.stage, end - begin),)
-        ocl.launch(self.stage.device, self.kernel, shape, *self.stage.arguments, *self.tables, *numbers, moments, tallies)
+        ocl.launch(
+            self.stage.device, self.kernel, shape, *self.stage.arguments, *self.tables, *numbers, moments, tallies
+        )
 
 
 def flat(on: Stage, seed: int = 0, photons: int = exits.EXITS) -> Flat:
@@ -59,7 +61,7 @@ def flat(on: Stage, seed: int = 0, photons: int = exits.EXITS) -> Flat:
     skin = tuple(float(v) for v in on.view["chromophores"])
     found = exits.trace(on.device, on.luts, skin, photons, seed)
     built = stage.kernel(
-        on, "flat", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1], SECTORS=exits.SECTORS,
+        on, "flat", "places", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1], SECTORS=exits.SECTORS,
         LEAST_COSINE=float(found.cosines[0]), REACH=REACH, PIXELS=PIXELS["gpu" if on.device.kind == "gpu" else "cpu"],
     )  # fmt: skip
     color, sigma = found.color(on.luts, skin)
