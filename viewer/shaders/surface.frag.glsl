@@ -88,10 +88,9 @@ void main() {
     detail = texture(detail_map, texcoord);
 
     float grazing = clamp(pow(nv + open, exp2(-16.0 * rough - 1.0)) - 1.0 + open, 0.0, 1.0);
-    vec3 mirror = reflect(-v, n);
-    vec3 around = mix(reflected(mirror, rough) * environment_lobe(albedo),
-                      reflected(mirror, rough2) * environment_lobe(lobe_albedo(nv, rough2)), SECOND_WEIGHT);
-    vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + grazing * mix(1.0, 0.6, pow(1.0 - nv, 2.0)) * around;
+    vec3 around = mix(reflected(n, v, nv, rough) * environment_lobe(albedo),
+                      reflected(n, v, nv, rough2) * environment_lobe(lobe_albedo(nv, rough2)), SECOND_WEIGHT);
+    vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + grazing * around;
     // Only where the far side is what the light meets first: no glow in nostrils that the nose shades.
     float covered = (light_position.z - textureLod(shadow_map, light_position.xy, 0.0).r) * light_range_mm;
     float behind = transmission * open * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0) * (1.0 - smoothstep(1.5, 3.0, covered / (surface.w * 32.0 + 1.5)));
