@@ -103,6 +103,17 @@ def skin_of(stage: Stage, look: Look) -> dict:
     }  # fmt: skip
 
 
+def from_skin(stage: Stage, look: Look) -> np.ndarray:
+    """Irradiance [3] from directions in which other skin is: skin of the look's color in mean light.
+
+    The mean over all directions of what sun (a quarter of it, as on a sphere) and surroundings shine on a surface; what
+    that skin itself lacks of the sky is left out.
+    """
+    luts = stage.sides["none"].luts
+    color = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")
+    return color * (look.light * lighting.SUN / 4 + look.environment * 0.282095 * stage.irradiance[0])
+
+
 def draw_surface(
     stage: Stage, look: Look, camera: scene.Camera, program: moderngl.Program, seen: moderngl.VertexArray,
     buffer: moderngl.Framebuffer, **more: moderngl.Texture,
@@ -129,7 +140,7 @@ def draw_surface(
         environment_entry=lighting.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
         environment_levels=0 if around is None else environment.LEVELS,
         environment_turn=tuple(f(np.radians(look.environment_azimuth)) for f in (np.cos, np.sin)),
-        **skin_of(stage, look),
+        from_skin=from_skin(stage, look), **skin_of(stage, look),
     )  # fmt: skip
     seen.render()
 
