@@ -109,7 +109,7 @@ def from_skin(stage: Stage, look: Look) -> np.ndarray:
     The mean over all directions of what sun (a quarter of it, as on a sphere) and surroundings shine on a surface; what
     that skin itself lacks of the sky is left out.
     """
-    luts = stage.sides["none"].luts
+    luts = stage.sides["none"].shown
     color = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")
     return color * (look.light * lighting.SUN / 4 + look.environment * 0.282095 * stage.irradiance[0])
 
