@@ -104,10 +104,10 @@ def skin_of(stage: Stage, look: Look) -> dict:
 
 
 def from_skin(stage: Stage, look: Look) -> np.ndarray:
-    """Irradiance [3] from directions in which other skin is: skin of the look's color in mean light.
+    """Irradiance [3] from where the head hides the sky: skin of the look's color, lit as skin is on the mean.
 
-    The mean over all directions of what sun (a quarter of it, as on a sphere) and surroundings shine on a surface; what
-    that skin itself lacks of the sky is left out.
+    On the mean over all normals a surface has a quarter of the sun's irradiance and all directions' mean of the
+    surroundings'; what that skin in turn lacks of both is left out.
     """
     luts = stage.sides["none"].shown
     color = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")

@@ -5,7 +5,8 @@
 #include "specular.glsl"
 #include "pores.glsl"
 uniform sampler2D normal_map, chromophore_map, surface_map, detail_map, shadow_map;
-uniform vec3 light_direction, light_color, eye, from_skin;
+uniform vec3 light_direction, light_color, eye;
+uniform vec3 from_skin;           // irradiance from directions in which the head hides the sky
 uniform vec3 chromophores;        // melanin, eumelanin, hemoglobin: what the maps multiply
 uniform vec3 chromophores_low, chromophores_high;  // what the LUT set covers
 uniform vec2 contrast;            // exponents of the melanin and hemoglobin ratios: freckles fade on dark skin
@@ -90,7 +91,8 @@ void main() {
     float grazing = clamp(pow(nv + open, exp2(-16.0 * rough - 1.0)) - 1.0 + open, 0.0, 1.0);
     vec3 around = mix(reflected(n, v, nv, rough) * environment_lobe(albedo),
                       reflected(n, v, nv, rough2) * environment_lobe(lobe_albedo(nv, rough2)), SECOND_WEIGHT);
-    vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + (grazing * around + (1.0 - grazing) * environment_lobe(albedo) * from_skin / 3.14159265);
+    around = mix(environment_lobe(albedo) * from_skin / 3.14159265, around, grazing);
+    vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + around;
     // Only where the far side is what the light meets first: no glow in nostrils that the nose shades.
     float covered = (light_position.z - textureLod(shadow_map, light_position.xy, 0.0).r) * light_range_mm;
     float behind = transmission * open * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0) * (1.0 - smoothstep(1.5, 3.0, covered / (surface.w * 32.0 + 1.5)));
