@@ -1,13 +1,6 @@
 // The walk of path_table.cl over a queue of entries: each starts as its entry's direction says, in the frame of its
 // normal, under flat skin; what leaves is put back into the world. Comments on the step stand there.
 
-// Two unit vectors along a surface (Duff et al. 2017).
-inline void tangents(float3 n, float3 *t, float3 *b) {
-    const float s = copysign(1.0f, n.z), a = -1.0f / (s + n.z), c = n.x * n.y * a;
-    *t = (float3)(1.0f + s * n.x * n.x * a, s * c, -s * n.x);
-    *b = (float3)(c, s + n.y * n.y * a, -n.y);
-}
-
 __kernel void flat_walk(__global const job_t *jobs, __global const entry_t *entries, __global exit_t *exits,
                         __global result_t *results) {
     const uint id = get_global_id(0);

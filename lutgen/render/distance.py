@@ -80,7 +80,7 @@ def tree_buffers(device: ocl.Device, positions: np.ndarray, triangles: np.ndarra
 def kernel(device: ocl.Device, entry: str, width: int = 16):
     """A built kernel of kernels/distance.cl."""
     text = ocl.struct_source(device, (STRUCT,)) + ocl.source("trace", "depth", "distance")
-    return ocl.kernel(device, entry, text, {"WIDTH": width, "CELLS": CELLS})
+    return ocl.kernel(device, entry, text, {"WIDTH": width})
 
 
 def _make(positions, triangles, cell: float, band: tuple[float, float], device: ocl.Device) -> dict[str, np.ndarray]:

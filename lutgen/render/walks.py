@@ -60,7 +60,7 @@ def kernel(device: ocl.Device, inside_mesh: bool, trust: str = ""):
         return ocl.kernel(device, "flat_walk", text, {"W": device.lanes})
     text = trust + ocl.struct_source(device, (*STRUCTS, distance.STRUCT))
     text += ocl.source("lanes", "rng", "optics", "queue", "depth", "mesh_walk")
-    return ocl.kernel(device, "mesh_walk", text, {"W": device.lanes, "CELLS": distance.CELLS})
+    return ocl.kernel(device, "mesh_walk", text, {"W": device.lanes})
 
 
 def jobs(medium: Medium, entries: int, seed: int, first_block: int, size: int) -> np.ndarray:
