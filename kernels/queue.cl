@@ -11,7 +11,7 @@ inline void no_exit(__global exit_t *out) { out->path_epidermis_mm = out->path_d
 inline uint next_entry(const job_t *job, __global const entry_t *entries, __global exit_t *exits, uint *taken) {
     while (*taken < job->photons) {
         const uint slot = job->first + job->stride * (*taken)++;
-        if (entries[slot].id != EMPTY) return slot;
+        if (entries[slot].sample != EMPTY) return slot;
         no_exit(exits + slot);
     }
     return EMPTY;

@@ -49,7 +49,8 @@ typedef struct {
     float t, u, v;
 } hit_t;
 
-inline float finite_inverse(float x) { return 1.0f / (fabs(x) < 1e-20f ? copysign(1e-20f, x) : x); }
+// Of the sign that picks a box's near side below: of -0 that is the positive one.
+inline float finite_inverse(float x) { return 1.0f / (fabs(x) < 1e-20f ? (x < 0 ? -1e-20f : 1e-20f) : x); }
 
 // Puts the children whose bits are set onto the stack, all but the nearest, which it returns.
 inline int nearest_child(__global const int *restrict child, uint set, const float *at, int *stack, float *reach, int *top) {

@@ -39,6 +39,7 @@ def build(positions: np.ndarray, triangles: np.ndarray, width: int) -> Bvh:
     boxes, children, leaves = [], [], []
 
     def collapsed(root: int) -> int:
+        """The number of the wide node that a binary node becomes."""
         me = len(boxes)
         box, child = np.repeat([[_FAR]] * 3 + [[-_FAR]] * 3, width, axis=1), np.zeros(width, "i4")
         boxes.append(box)

@@ -1,100 +1,77 @@
-"""Walks over a queue: entries into the skin on the device become exits (kernels/flat_walk.cl, kernels/mesh_walk.cl).
-
-Entry i of a queue has the wavelength of index i % K, and its exit is exit i. Paths are absorption-free with drawn
-lives, as the path table's: an exit weighs exp(-(mu_e - nu) Le - (mu_d - nu) Ld).
-"""
+"""Ways to take samples of a picture: each opens on a stage and then adds samples of pixels to their moments."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from lutgen import device as ocl
-from lutgen.render import distance
-from lutgen.solvers.path_table import Medium
+from lutgen.render import exits, stage
+from lutgen.render.stage import Stage
 
-ENTRY = np.dtype(
-    [("position", "f4", 3), ("wavelength", "u4"), ("normal", "f4", 3), ("pad", "u4"), ("direction", "f4", 3), ("id", "u4")]
-)
-"""Position mm, wavelength index, outward unit normal of the skin there, unit direction inside the skin, the sample's id
-or EMPTY; all in the world."""
-EXIT = np.dtype(
-    [("position", "f4", 3), ("path_epidermis_mm", "f4"), ("direction", "f4", 3), ("path_dermis_mm", "f4")]
-    + [("normal", "f4", 3), ("pad", "u4")]
-)
-"""Position mm, unit direction in air, outward unit normal, and the paths in both layers, negative where none left."""
-EMPTY = 0xFFFFFFFF
-JOB = np.dtype(
-    [(name, "f4") for name in ("mu_s", "g", "nu", "n", "epidermis_mm")]
-    + [(name, "u4") for name in ("seed", "wavelength", "block", "photons", "max_steps", "first", "stride")]
-)
-RESULT = np.dtype([(name, "u4") for name in ("escaped", "unfinished", "entered", "lost")] + [("events", "u8")])
-STRUCTS = (("entry_t", ENTRY), ("exit_t", EXIT), ("job_t", JOB), ("result_t", RESULT))
-BLOCK = {"cpu": 2048, "gpu": 128}
-"""Entries that one work-item walks in turn; random streams are keyed by their number."""
-STEPS_PER_PHOTON = 100_000
-"""Steps after which a photon is given up, on average over a block: far beyond any that skin's absorption allows."""
+MOMENTS = 10
+PIXELS = {"cpu": 64, "gpu": 1}
+"""Pixels that one work-item takes in turn."""
+REACH = 1.5
+"""How far above and below the tangent plane an exit is looked for, in units of its distance."""
+
+
+class Walk(Protocol):
+    """An opened way to take samples.
+
+    `group`: samples that make one whole estimate; counts of samples are multiples of it. `facts`: for the manifest.
+    """
+
+    group: int
+    facts: dict
+
+    def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
+        """Add samples first ... first + samples - 1 of the pixels begin ... end - 1 to the buffers of moments
+        [pixels, 10] f4 and of tallies [items, TALLIES] u4; `items(stage, end - begin)` rows of it are used."""
+
+
+def items(stage: Stage, pixels: int) -> int:
+    """Work-items for that many pixels."""
+    return -(-pixels // PIXELS["gpu" if stage.device.kind == "gpu" else "cpu"])
 
 
 @dataclass
-class Tally:
-    """What walks did: entries, of which escaped, were lost off the grid or left unfinished by the step budget; events."""
+class Flat:
+    """Flat walks drawn from path tables (kernels/flat.cl)."""
 
-    entered: int = 0
-    escaped: int = 0
-    lost: int = 0
-    unfinished: int = 0
-    events: int = 0
+    stage: Stage
+    kernel: object
+    tables: tuple
+    facts: dict
+    group: int = 1
 
-
-def block(device: ocl.Device) -> int:
-    """Entries per block on that device."""
-    return BLOCK["gpu" if device.kind == "gpu" else "cpu"]
-
-
-def kernel(device: ocl.Device, inside_mesh: bool, trust: str = ""):
-    """The built kernel of either walk."""
-    if not inside_mesh:
-        text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "queue", "flat_walk")
-        return ocl.kernel(device, "flat_walk", text, {"W": device.lanes})
-    text = trust + ocl.struct_source(device, (*STRUCTS, distance.STRUCT))
-    text += ocl.source("lanes", "rng", "optics", "queue", "depth", "mesh_walk")
-    return ocl.kernel(device, "mesh_walk", text, {"W": device.lanes})
+    def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
+        numbers = (np.uint32(v) for v in (begin, end, first, samples))
+        shape = (items(self.stage, end - begin),)
+        ocl.launch(
+            self.stage.device, self.kernel, shape, *self.stage.arguments, *self.tables, *numbers, moments, tallies
+        )
 
 
-def jobs(medium: Medium, entries: int, seed: int, first_block: int, size: int) -> np.ndarray:
-    """Jobs for a queue of `entries` in blocks of `size` per wavelength, numbered from `first_block` on."""
-    K = len(medium.wavelength_nm)
-    each = -(-entries // K)
-    blocks = -(-each // size)
-    table = np.zeros((blocks, K), JOB)
-    for field, values in (("mu_s", medium.mu_s_per_mm), ("g", medium.g), ("nu", medium.nu_per_mm)):
-        table[field] = np.asarray(values)
-    table["n"], table["epidermis_mm"], table["seed"] = medium.n, medium.epidermis_mm, seed
-    table["wavelength"] = np.rint(np.asarray(medium.wavelength_nm) * 1000)
-    number, k = np.arange(blocks)[:, None], np.arange(K)
-    table["block"] = first_block + number
-    table["stride"], table["first"] = K, number * size * K + k
-    table["photons"] = np.clip((entries - k + K - 1) // K - number * size, 0, size)
-    per_life = np.minimum(4 * (medium.mu_s_per_mm / np.maximum(medium.nu_per_mm, 1e-30) + 1), STEPS_PER_PHOTON)
-    table["max_steps"] = np.minimum(per_life * (4 * size + 64), 4e9).astype("u4")
-    return table.ravel()
+def flat(on: Stage, seed: int = 0, photons: int = exits.EXITS) -> Flat:
+    """Trace the exits of the stage's skin and open the flat walk over them."""
+    skin = tuple(float(v) for v in on.view["chromophores"])
+    found = exits.trace(on.device, on.luts, skin, photons, seed)
+    built = stage.kernel(
+        on, "flat", "places", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1], SECTORS=exits.SECTORS,
+        LEAST_COSINE=float(found.cosines[0]), REACH=REACH, PIXELS=PIXELS["gpu" if on.device.kind == "gpu" else "cpu"],
+    )  # fmt: skip
+    color, sigma = found.color(on.luts, skin)
+    facts = {
+        "walk": "flat", "exits_per_wavelength_and_angle": photons, "angles": len(found.cosines),
+        "rings": len(found.radius_edges_mm) - 1, "sectors": exits.SECTORS, "events": found.events,
+        "color_acescg": color.tolist(), "color_std_error_acescg": sigma.tolist(), "reach": REACH,
+    }  # fmt: skip
+    return Flat(on, built, exits.buffers(on.device, found), facts)
 
 
-def walk(
-    medium: Medium, entry_buffer, exit_buffer, entries: int, seed: int, first_block: int, device: ocl.Device,
-    tally: Tally, depth_buffers=None,
-) -> int:  # fmt: skip
-    """Walk a queue on the device, inside the mesh whose depths are given or under flat skin; the next free block."""
-    table = jobs(medium, entries, seed, first_block, block(device))
-    results = np.zeros(len(table), RESULT)
-    found = ocl.buffer(device, results)
-    compiled = kernel(device, depth_buffers is not None)
-    ocl.launch(
-        device, compiled, (len(table),), ocl.buffer(device, table), entry_buffer, exit_buffer, found, *(depth_buffers or ())
-    )
-    ocl.read(device, found, results)
-    for name in ("entered", "escaped", "lost", "unfinished", "events"):
-        setattr(tally, name, getattr(tally, name) + int(results[name].sum()))
-    return int(table["block"].max()) + 1
+WALKS: dict[str, Callable[..., Walk]] = {"flat": flat}
+"""By the name that --walk takes."""
