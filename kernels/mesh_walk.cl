@@ -15,13 +15,13 @@
 
 enum { X, Y, Z, UX, UY, UZ, MIDDLE, ROOM, BEYOND, PATH, PATH_E, BORN, FIELDS };
 
-// Where a lane's anchor lies, and its outward normal.
+// Where a lane's anchor lies, and its frame: two vectors along the surface and the outward normal.
 typedef struct {
-    float3 at, normal;
+    float3 at, t, b, normal;
 } anchor_t;
 
 // Gives lane i an anchor: at p, `depth` mm under a surface of that normal, for a photon with direction d.
-inline void put_anchor(float (*lanes)[W], anchor_t *anchors, uint i, float3 p, float3 d, float3 normal, float depth, float room) {
+inline void put_anchor(float (*lanes)[W], anchor_t *anchor, uint i, float3 p, float3 d, float3 normal, float depth, float room) {
     float3 t, b;
     tangents(normal, &t, &b);
     lanes[X][i] = lanes[Y][i] = 0.0f;
@@ -30,30 +30,32 @@ inline void put_anchor(float (*lanes)[W], anchor_t *anchors, uint i, float3 p, f
     lanes[UY][i] = dot(d, b);
     lanes[UZ][i] = -dot(d, normal);
     lanes[ROOM][i] = room * room;
-    anchors[i].at = p;
-    anchors[i].normal = normal;
+    anchor->at = p;
+    anchor->t = t;
+    anchor->b = b;
+    anchor->normal = normal;
 }
 
 // Moves lane i's anchor to where it is; false where that is outside of all bricks.
-inline bool settle(float (*lanes)[W], anchor_t *anchors, uint i, float epidermis, GRID) {
-    float3 normal = anchors[i].normal, t, b;
-    tangents(normal, &t, &b);
-    float3 p = anchors[i].at + lanes[X][i] * t + lanes[Y][i] * b + (lanes[MIDDLE][i] - lanes[Z][i]) * normal;
-    const float3 d = lanes[UX][i] * t + lanes[UY][i] * b - lanes[UZ][i] * normal;
+inline bool settle(float (*lanes)[W], anchor_t *anchor, uint i, float epidermis, GRID) {
+    const float x = lanes[X][i], y = lanes[Y][i], up = lanes[MIDDLE][i] - lanes[Z][i];
+    float3 p = anchor->at + x * anchor->t + y * anchor->b + up * anchor->normal;
     const float4 depth = depth_at(p, GRID_ARGUMENTS);
-    const float slope = sqrt(dot(depth.xyz, depth.xyz)), trust = clamp(depth.w, LEAST_TRUST, MOST_TRUST);
-    const float clear = depth.w - epidermis - (slope > 0.0f ? 0.04f * grid->spacing_mm : 0.0f);
-    float under = epidermis + 2.0f * fmax(clear, trust), room = fmax(clear, trust);
-    if (clear < trust && slope > FLAT_SLOPE) {
-        normal = -depth.xyz / slope;
-        under = depth.w / slope;
-        room = trust;
-        if (under < 0.0f) {  // a plane was not quite the surface: back onto it
-            p += under * normal;
-            under = 0.0f;
-        }
+    const float square = dot(depth.xyz, depth.xyz), inverse = rsqrt(square), trust = clamp(depth.w, LEAST_TRUST, MOST_TRUST);
+    const float clear = depth.w - epidermis - (square > 0.0f ? 0.04f * grid->spacing_mm : 0.0f);
+    if (clear < trust && square > FLAT_SLOPE * FLAT_SLOPE) {
+        const float3 d = lanes[UX][i] * anchor->t + lanes[UY][i] * anchor->b - lanes[UZ][i] * anchor->normal;
+        const float3 normal = -inverse * depth.xyz;
+        const float under = depth.w * inverse;
+        p += fmin(under, 0.0f) * normal;  // where a plane was not quite the surface: back onto it
+        put_anchor(lanes, anchor, i, p, d, normal, fmax(under, 0.0f), trust);
+    } else {  // any frame will do, as long as it has no surface nearby
+        const float room = fmax(clear, trust);
+        anchor->at = p;
+        lanes[X][i] = lanes[Y][i] = 0.0f;
+        lanes[Z][i] = lanes[MIDDLE][i] = epidermis + 2.0f * room;
+        lanes[ROOM][i] = room * room;
     }
-    put_anchor(lanes, anchors, i, p, d, normal, under, room);
     return depth.w > 0.5f * OUTSIDE;
 }
 
@@ -71,24 +73,22 @@ inline float3 onto_surface(float3 *p, int steps, GRID) {
 }
 
 // Starts lane i at an entry; false where the surface does not lie there.
-inline bool enter(float (*lanes)[W], anchor_t *anchors, uint i, __global const entry_t *entry, GRID) {
+inline bool enter(float (*lanes)[W], anchor_t *anchor, uint i, __global const entry_t *entry, GRID) {
     float3 p = vload3(0, entry->position), d = vload3(0, entry->direction);
     const float3 normal = onto_surface(&p, 4, GRID_ARGUMENTS);
     if (dot(normal, normal) == 0.0f) return false;
     const float out = dot(d, normal);  // where the picture's normal is not the grid's
-    put_anchor(lanes, anchors, i, p, out < 0.0f ? d : d - 2.0f * out * normal, normal, 0.0f, LEAST_TRUST);
+    put_anchor(lanes, anchor, i, p, out < 0.0f ? d : d - 2.0f * out * normal, normal, 0.0f, LEAST_TRUST);
     return true;
 }
 
 // Lets lane i leave through its plane: its step is taken back to there.
-inline void leave(const float (*lanes)[W], const anchor_t *anchors, uint i, float n, __global exit_t *out, GRID) {
-    const float3 normal = anchors[i].normal;
-    float3 t, b;
-    tangents(normal, &t, &b);
-    const float3 along = lanes[UX][i] * t + lanes[UY][i] * b;
-    float3 p = anchors[i].at + lanes[X][i] * t + lanes[Y][i] * b + lanes[MIDDLE][i] * normal - lanes[BEYOND][i] * along;
+inline void leave(const float (*lanes)[W], const anchor_t *anchor, uint i, float n, __global exit_t *out, GRID) {
+    const float3 along = lanes[UX][i] * anchor->t + lanes[UY][i] * anchor->b;
+    float3 p = anchor->at + lanes[X][i] * anchor->t + lanes[Y][i] * anchor->b + lanes[MIDDLE][i] * anchor->normal -
+               lanes[BEYOND][i] * along;
     onto_surface(&p, 1, GRID_ARGUMENTS);
-    put_exit(out, p, refracted_out(along, normal, n), normal, lanes[PATH][i], lanes[PATH_E][i]);
+    put_exit(out, p, refracted_out(along, anchor->normal, n), anchor->normal, lanes[PATH][i], lanes[PATH_E][i]);
 }
 
 __kernel void mesh_walk(__global const job_t *jobs, __global const entry_t *entries, __global exit_t *exits,
@@ -147,7 +147,7 @@ __kernel void mesh_walk(__global const job_t *jobs, __global const entry_t *entr
                 STORE(room, lanes[ROOM]);
                 for (uint set = moved; set; set &= set - 1u) {
                     const uint i = lowest_bit(set);
-                    if (!settle(lanes, anchors, i, thickness, GRID_ARGUMENTS)) gone |= 1u << i, lost++;
+                    if (!settle(lanes, anchors + i, i, thickness, GRID_ARGUMENTS)) gone |= 1u << i, lost++;
                 }
                 if (gone) {
                     STORE(beyond, lanes[BEYOND]);
@@ -161,14 +161,14 @@ __kernel void mesh_walk(__global const job_t *jobs, __global const entry_t *entr
                         const uint i = lowest_bit(gone);
                         if (slots[i] != EMPTY) {
                             running--;
-                            if (left >> i & 1u) leave(lanes, anchors, i, n, exits + slots[i], GRID_ARGUMENTS), escaped++;
+                            if (left >> i & 1u) leave(lanes, anchors + i, i, n, exits + slots[i], GRID_ARGUMENTS), escaped++;
                             else no_exit(exits + slots[i]);
                         }
                         paths[i] = paths_e[i] = 0.0f;
                         lives[i] = lanes[BORN][i];
                         while ((slots[i] = next_entry(&job, entries, exits, &taken)) != EMPTY) {
                             entered++;
-                            if (enter(lanes, anchors, i, entries + slots[i], GRID_ARGUMENTS)) break;
+                            if (enter(lanes, anchors + i, i, entries + slots[i], GRID_ARGUMENTS)) break;
                             no_exit(exits + slots[i]);
                             lost++;
                         }
