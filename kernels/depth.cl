@@ -8,28 +8,51 @@
 #define GRID_ARGUMENTS grid, middles, rows, values
 #define OUTSIDE -1e9f
 
-inline float between(float a, float b, float share) { return fma(share, b - a, a); }
+// Depths at the corners of the cell (i, j, k) that the place (x, y, z) in cells lies in, `stride` apart. Where only a
+// lower bound of the depth is known, it at all corners, so that there is no gradient.
+inline void cell_depths(int i, int j, int k, float x, float y, float z, float *out, int stride, GRID) {
+    const uint nx = grid->bricks[0], ny = grid->bricks[1];
+    const uint bx = (uint)i / CELLS, by = (uint)j / CELLS, bz = (uint)k / CELLS;  // huge where negative
+    float bound = OUTSIDE;
+    if (bx < nx && by < ny && bz < (uint)grid->bricks[2]) {
+        const uint number = (bz * ny + by) * nx + bx;
+        const int row = rows[number];
+        if (row >= 0) {
+            const float unit = grid->unit_mm;
+            __global const short *v = values + (size_t)row * (CORNERS * CORNERS * CORNERS) +
+                                      ((k % CELLS) * CORNERS + j % CELLS) * CORNERS + i % CELLS;
+            for (int c = 0; c < 8; c++)
+                out[c * stride] = unit * v[(c >> 2) * CORNERS * CORNERS + (c >> 1 & 1) * CORNERS + (c & 1)];
+            return;
+        }
+        x -= bx * CELLS + 0.5f * CELLS, y -= by * CELLS + 0.5f * CELLS, z -= bz * CELLS + 0.5f * CELLS;
+        bound = middles[number] - sqrt(x * x + y * y + z * z) * grid->spacing_mm;
+    }
+    for (int c = 0; c < 8; c++) out[c * stride] = bound;
+}
+
+// Depth, and its gradient times a cell's width, between a cell's corners at (x, y, z) of its sides.
+#define BETWEEN(a, b, share) fma(share, (b) - (a), a)
+#define INTERPOLATE(REAL, CORNER, x, y, z, depth, rise_x, rise_y, rise_z)                                        \
+    {                                                                                                            \
+        const REAL a = BETWEEN(CORNER(0), CORNER(1), x), b = BETWEEN(CORNER(2), CORNER(3), x);                   \
+        const REAL c = BETWEEN(CORNER(4), CORNER(5), x), d = BETWEEN(CORNER(6), CORNER(7), x);                   \
+        const REAL near = BETWEEN(a, b, y), far = BETWEEN(c, d, y);                                              \
+        depth = BETWEEN(near, far, z);                                                                           \
+        rise_x = BETWEEN(BETWEEN(CORNER(1) - CORNER(0), CORNER(3) - CORNER(2), y),                               \
+                         BETWEEN(CORNER(5) - CORNER(4), CORNER(7) - CORNER(6), y), z);                           \
+        rise_y = BETWEEN(b - a, d - c, z);                                                                       \
+        rise_z = far - near;                                                                                     \
+    }
 
 // Gradient (mm per mm) and depth in mm; where only a lower bound of the depth is known, it and no gradient.
 inline float4 depth_at(float3 p, GRID) {
-    const float per_mm = grid->per_mm;
-    float x = (p.x - grid->origin[0]) * per_mm, y = (p.y - grid->origin[1]) * per_mm, z = (p.z - grid->origin[2]) * per_mm;
-    const int i = (int)x, j = (int)y, k = (int)z, nx = grid->bricks[0], ny = grid->bricks[1];
-    if (!(x >= 0 && y >= 0 && z >= 0 && i < nx * CELLS && j < ny * CELLS && k < grid->bricks[2] * CELLS))
-        return (float4)(0.0f, 0.0f, 0.0f, OUTSIDE);
-    const int number = ((k / CELLS) * ny + j / CELLS) * nx + i / CELLS, row = rows[number];
-    if (row < 0) {
-        x -= i / CELLS * CELLS + 0.5f * CELLS, y -= j / CELLS * CELLS + 0.5f * CELLS, z -= k / CELLS * CELLS + 0.5f * CELLS;
-        return (float4)(0.0f, 0.0f, 0.0f, middles[number] - sqrt(x * x + y * y + z * z) * grid->spacing_mm);
-    }
-    x -= i, y -= j, z -= k;
-    __global const short *v = values + (size_t)row * (CORNERS * CORNERS * CORNERS)
-                              + ((k % CELLS) * CORNERS + j % CELLS) * CORNERS + i % CELLS;
-    const float a = v[0], b = v[CORNERS], c = v[CORNERS * CORNERS], d = v[CORNERS * CORNERS + CORNERS];
-    const float ax = v[1] - a, bx = v[CORNERS + 1] - b, cx = v[CORNERS * CORNERS + 1] - c;
-    const float dx = v[CORNERS * CORNERS + CORNERS + 1] - d;
-    const float a1 = fma(x, ax, a), b1 = fma(x, bx, b), c1 = fma(x, cx, c), d1 = fma(x, dx, d);
-    const float near = between(a1, b1, y), far = between(c1, d1, y), slope = grid->unit_mm * per_mm;
-    return (float4)(slope * between(between(ax, bx, y), between(cx, dx, y), z), slope * between(b1 - a1, d1 - c1, z),
-                    slope * (far - near), grid->unit_mm * between(near, far, z));
+    const float3 at = (p - vload3(0, grid->origin)) * grid->per_mm;
+    const int i = (int)floor(at.x), j = (int)floor(at.y), k = (int)floor(at.z);
+    float corner[8], depth, x, y, z;
+    cell_depths(i, j, k, at.x, at.y, at.z, corner, 1, GRID_ARGUMENTS);
+#define CORNER(c) corner[c]
+    INTERPOLATE(float, CORNER, at.x - i, at.y - j, at.z - k, depth, x, y, z)
+#undef CORNER
+    return (float4)((float3)(x, y, z) * grid->per_mm, depth);
 }

@@ -62,7 +62,7 @@ def block(device: ocl.Device) -> int:
 
 def kernel(device: ocl.Device, inside: bool, before: str = ""):
     """The built kernel of either walk; `before` are definitions that replace its own."""
-    structs, names = (*_STRUCTS, distance.STRUCT), ("depth", "mesh_walk") if inside else ("flat_walk",)
+    structs, names = (*_STRUCTS, distance.STRUCT), ("depth", "anchors", "mesh_walk") if inside else ("flat_walk",)
     text = before + ocl.struct_source(device, structs) + ocl.source("lanes", "rng", "optics", "queue", *names)
     return ocl.kernel(device, names[-1], text, {"W": device.lanes})
 
