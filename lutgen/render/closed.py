@@ -33,7 +33,7 @@ def surface(positions_mm: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
     if holes:
         wide = max(float(np.ptp(positions[rim[:, 0]], axis=0).max()) for rim in holes)
         raise InputError(
-            f"mesh: {len(holes)} holes, {sum(map(len, holes))} open edges, the largest {wide:.1f} mm wide: a walk "
+            f"mesh: {len(holes)} hole{'s' * (len(holes) > 1)}, {sum(map(len, holes))} open edges, the largest {wide:.1f} mm wide: a walk "
             "inside needs a closed mesh; close them in your editor, or use --walk flat"
         )
     for rim in rims:
