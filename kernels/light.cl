@@ -61,6 +61,16 @@ inline float3 surroundings(const scene_t *s, float3 d) {
     return view->environment * mix(mix(a[first], a[next], right), mix(b[first], b[next], right), down).xyz;
 }
 
+// How bright the surroundings are about direction d, roughly and soon: what directions are chosen by.
+inline float sky_strength(const scene_t *s, float3 d) {
+    float3 p = (float3)(d.x * s->view->turn[0] - d.z * s->view->turn[1], d.y, d.x * s->view->turn[1] + d.z * s->view->turn[0]);
+    p /= fabs(p.x) + fabs(p.y) + fabs(p.z);
+    float x = p.y < 0.0f ? copysign(1.0f - fabs(p.z), p.x) : p.x, z = p.y < 0.0f ? copysign(1.0f - fabs(p.x), p.z) : p.z;
+    int column = min((int)((0.5f + 0.5f * x) * SKY_CELLS), SKY_CELLS - 1);
+    int row = min((int)((0.5f + 0.5f * z) * SKY_CELLS), SKY_CELLS - 1);
+    return s->sky[row * SKY_CELLS + column];
+}
+
 // Where light rays start: off the round surface, so that no triangle shades itself or its neighbors.
 inline float3 start(const surface_t *here) { return here->lifted + 0.01f * here->smooth; }
 
@@ -94,14 +104,34 @@ inline float3 outward(float3 d, float3 n) {
     return c < 0.0f ? d - 2.0f * c * n : d;
 }
 
-// A direction of density cosine over pi about the mapped normal, and what enters of the light from there.
-inline float3 toward_surroundings(const scene_t *s, const surface_t *here, rng_t *rng, float *enters) {
-    float3 t, b, n = here->mapped;
-    float square = next_uniform(rng), sine = sqrt(square), c = sqrt(1.0f - square), y, x;
+// A direction into the surroundings, and the weight of the light from there: drawn out of CANDIDATES about the mapped
+// normal by how much light would come from each (resampled importance sampling, Talbot et al. 2005); none counts less
+// than a share of the mean, since skin may be there instead. Candidates lie evenly in azimuth and in sine squared.
+inline float3 toward_surroundings(const scene_t *s, const surface_t *here, rng_t *rng, float *weight) {
+    float3 t, b, n = here->mapped, chosen = n;
+    const float turn_x = TURN_COSINE, turn_y = TURN_SINE, first = next_uniform(rng);
+    float y, x, sum = 0.0f, kept = 1.0f, enters = 1.0f, u = next_uniform(rng);
     uniform_azimuth(next_bits(rng), &y, &x);
     across(n, &t, &b);
-    *enters = entry_factor(s, c);
-    return outward(normalize(n * c + (t * x + b * y) * sine), here->smooth);
+    for (uint i = 0; i < CANDIDATES; i++) {
+        float square = ((i * STRIDE) % CANDIDATES + first) * (1.0f / CANDIDATES), sine = sqrt(square), c = sqrt(1.0f - square);
+        float3 d = outward(normalize(n * c + (t * x + b * y) * sine), here->smooth);
+        float entering = entry_factor(s, c), strength = entering * sky_strength(s, d);
+        sum += strength;
+        if (u * sum < strength) {
+            u = u * sum / strength;
+            chosen = d;
+            kept = strength;
+            enters = entering;
+        } else {
+            u = (u * sum - strength) / (sum - strength);
+        }
+        float turned = x * turn_x - y * turn_y;
+        y = x * turn_y + y * turn_x;
+        x = turned;
+    }
+    *weight = enters * sum / (CANDIDATES * kept);
+    return chosen;
 }
 
 // A direction that one of the lobes reflects light from toward v, drawn by its visible facets (Heitz 2018), and the

@@ -37,12 +37,12 @@ inline float3 gathered(const scene_t *s, const surface_t *there, float3 color, s
     float3 light = color * sunlight(s, there, toward_sun(s, rng), tally + SUN_RAYS);
     next->hit.triangle = -1;
     if (s->view->environment > 0.0f) {
-        float enters;
-        next->direction = toward_surroundings(s, there, rng, &enters);
+        float weight;
+        next->direction = toward_surroundings(s, there, rng, &weight);
         tally[SKY_RAYS]++;
         next->hit = nearest(s, start(there), next->direction);
-        if (next->hit.triangle < 0) light += color * enters * surroundings(s, next->direction);
-        next->tint *= enters;
+        if (next->hit.triangle < 0) light += color * weight * surroundings(s, next->direction);
+        next->tint *= weight;
     }
     return light;
 }

@@ -3,9 +3,9 @@
 #define SCENE TREE, __global const view_t *view, __global const float8 *vertices, __global const int *corners, \
     __global const half *chromophore_map, __global const half *surface_map, __global const half *normal_map, \
     __global const half *detail_map, __global const float4 *pore_map, __global const float4 *environment_map, \
-    __global const float2 *lobe_table, __global const float *waves
+    __global const float *sky, __global const float2 *lobe_table, __global const float *waves
 #define SCENE_HERE {boxes, children, shapes, numbers, view, vertices, corners, chromophore_map, surface_map, normal_map, \
-    detail_map, pore_map, environment_map, lobe_table, waves}
+    detail_map, pore_map, environment_map, sky, lobe_table, waves}
 #define TREE_OF(s) (s)->boxes, (s)->children, (s)->shapes, (s)->numbers
 
 typedef struct {
@@ -18,6 +18,7 @@ typedef struct {
     __global const int *corners;      // three per triangle
     __global const half *chromophore_map, *surface_map, *normal_map, *detail_map;
     __global const float4 *pore_map, *environment_map;
+    __global const float *sky;          // how bright the environment is, over an octahedron
     __global const float2 *lobe_table;  // energy of a GGX lobe over (roughness, root of the cosine)
     __global const float *waves;        // WAVE floats per wavelength
 } scene_t;

@@ -27,22 +27,27 @@ inline void enter(const scene_t *s, const surface_t *here, const start_t *from, 
     put3(sample->tint, from->tint * shown(s, here, d));
 }
 
-// Work-item i makes camera rays for the samples first ... first + samples - 1 of pixel begin + i.
-__kernel void aim(SCENE, uint begin, uint first, uint samples, __global entry_t *entries, __global sample_t *queue,
-                  __global uint *tallies) {
+// The places of a work-item: those of the samples of PIXELS pixels.
+#define EACH_PLACE(slot) \
+    for (uint item = get_global_id(0), slot = item * PIXELS * samples, \
+         stop = min((item + 1u) * PIXELS, end - begin) * samples; slot < stop; slot++)
+
+// Camera rays for the samples first ... first + samples - 1 of pixels begin ... end - 1.
+__kernel void aim(SCENE, uint begin, uint end, uint first, uint samples, __global entry_t *entries,
+                  __global sample_t *queue, __global uint *tallies) {
     const scene_t scene = SCENE_HERE, *s = &scene;
     uint tally[TALLIES] = {0};
-    for (uint i = 0; i < samples; i++) {
-        const uint slot = get_global_id(0) * samples + i;
+    EACH_PLACE(slot) {
+        const uint pixel = begin + slot / samples, number = first + slot % samples;
         __global sample_t *sample = queue + slot;
-        rng_t rng = stream(s, begin + get_global_id(0), first + i, 0);
+        rng_t rng = stream(s, pixel, number, 0);
         start_t from = {{-1, 0, 0, 0}, 0.0f, 1.0f}, mirrored = from;
         float3 light = 0.0f;
-        sample->wavelength = (first + i) % WAVES;
+        sample->wavelength = number % WAVES;
         sample->share = WAVES;
         sample->bounces = 0;
         entries[slot].sample = EMPTY;
-        from.hit = aimed(s, begin + get_global_id(0), &rng, &from.direction, tally);
+        from.hit = aimed(s, pixel, &rng, &from.direction, tally);
         sample->hit = from.hit.triangle >= 0;
         if (sample->hit) {
             const surface_t here = surface_at(s, from.hit);
@@ -79,13 +84,13 @@ inline surface_t left_at(const scene_t *s, const surface_t *here, float3 p, floa
 #endif
 }
 
-// Work-item i gathers light at `count` exits from i count on; `waiting` counts the walks that go on.
-__kernel void gather(SCENE, uint begin, uint first, uint samples, uint round, uint count, __global entry_t *entries,
+// Light at the exits of a round; `waiting` counts the walks that go on, by work-item.
+__kernel void gather(SCENE, uint begin, uint end, uint first, uint samples, uint round, __global entry_t *entries,
                      __global const exit_t *exits, __global sample_t *queue, __global uint *tallies,
                      __global uint *waiting) {
     const scene_t scene = SCENE_HERE, *s = &scene;
     uint tally[TALLIES] = {0}, go_on = 0;
-    for (uint slot = get_global_id(0) * count; slot < (get_global_id(0) + 1) * count; slot++) {
+    EACH_PLACE(slot) {
         __global entry_t *entry = entries + slot;
         __global sample_t *sample = queue + slot;
         if (entry->sample == EMPTY) continue;
@@ -125,20 +130,20 @@ __kernel void gather(SCENE, uint begin, uint first, uint samples, uint round, ui
     for (int i = 0; i < TALLIES; i++) tallies[get_global_id(0) * TALLIES + i] += tally[i];
 }
 
-// Work-item i adds the samples of pixel begin + i, WAVES at a time, to its moments.
-__kernel void settle(uint begin, uint samples, __global const sample_t *queue, __global float *moments,
+// Adds the samples of each pixel, WAVES at a time, to its moments.
+__kernel void settle(uint begin, uint end, uint samples, __global const sample_t *queue, __global float *moments,
                      __global uint *tallies) {
     uint tally[TALLIES] = {0};
-    __global const sample_t *sample = queue + get_global_id(0) * samples;
-    for (uint i = 0; i < samples; i += WAVES) {
-        float3 light = 0.0f;
-        float hits = 0.0f;
-        for (uint k = 0; k < WAVES; k++, sample++) {
-            light += view3(sample->light);
-            hits += sample->hit;
-        }
+    float3 light = 0.0f;
+    float hits = 0.0f;
+    EACH_PLACE(slot) {
+        light += view3(queue[slot].light);
+        hits += queue[slot].hit;
+        if ((slot + 1) % WAVES) continue;
         if (hits > 0.0f)
-            add_sample(moments + (begin + get_global_id(0)) * MOMENTS, light / WAVES, hits / WAVES, tally);
+            add_sample(moments + (begin + slot / samples) * MOMENTS, light / WAVES, hits / WAVES, tally);
+        light = 0.0f;
+        hits = 0.0f;
     }
     for (int i = 0; i < TALLIES; i++) tallies[get_global_id(0) * TALLIES + i] += tally[i];
 }

@@ -68,7 +68,7 @@ def studio_mean() -> float:
 def fresnel(cosine: np.ndarray) -> np.ndarray:
     """Schlick's reflectance at index 1.4, as the shaders have it."""
     f0 = ((REFRACTIVE_INDEX - 1) / (REFRACTIVE_INDEX + 1)) ** 2
-    return f0 + (1 - f0) * (1 - cosine) ** 5
+    return np.asarray(f0 + (1 - f0) * (1 - cosine) ** 5)
 
 
 def exit_mean() -> float:

@@ -128,6 +128,7 @@ def test_a_head_takes_inverted_maps_and_keeps_given_ones(luts):
     given[..., 2] = 2.5
     made, notes = subject.inverted(luts, Maps(chromophores=given, albedo=albedo), 0.7)
     assert made.albedo is None
+    assert made.chromophores is not None
     assert np.all(made.chromophores[..., 2] == 2.5)
     assert np.corrcoef(np.log(made.chromophores[..., 0]).ravel(), np.log(m).ravel())[0, 1] > 0.6
     assert "albedo inverted: median melanin 0.04" in notes[0]

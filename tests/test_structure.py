@@ -20,7 +20,7 @@ LEVELS = [
     {"charts", "exports", "render"},
     {"baking"},
     {"solvers"},
-    {"subject"},
+    {"subject", "tone"},
     {"painting"},
     {"placing", "inversion"},
     {"probing", "head", "maps", "environment"},

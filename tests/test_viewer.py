@@ -278,16 +278,21 @@ def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_pa
     assert shape.notes == ("('a.glb', 2.0, True)", "painted")
     assert np.array_equal(shape.positions_mm, np.eye(4, 3) - [1, 2, 3])
     assert found.albedo is None
+    assert found.chromophores is not None
     assert found.chromophores[0, 0, 0] == 2
     textures_given |= {"albedo": np.full((1, 1, 3), 188, "u1"), "normal": pixel + 1}
     _, found = subject.model("a.glb", None, None)
     assert found.chromophores is None  # it is in the albedo already
+    assert found.albedo is not None
+    assert found.normal is not None
     assert found.albedo[0, 0, 0] == pytest.approx(0.503, abs=1e-3)
     assert found.normal[0, 0, 0] == 10
     assert np.all(found.surface == 0.5)
     Image.fromarray(np.full((1, 1), 255, "u1")).save(tmp_path / "occlusion.png")
     Image.new("RGB", (1, 1), (128, 128, 255)).save(tmp_path / "normal.png")
     _, found = subject.model("a.glb", None, str(tmp_path))
+    assert found.surface is not None
+    assert found.normal is not None
     assert found.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
     assert found.normal[0, 0, 2] == 1
     assert found.albedo is not None

@@ -72,8 +72,9 @@ class Exits:
         """Mean of the weights' power [C, K] over all photons of an entry angle."""
         mu = expansion.coefficients(luts.paths.wavelength_nm, luts.absorbers, *(np.array([v]) for v in skin))
         rates = np.stack([m[:, 0] for m in mu], axis=1) - luts.paths.nu_per_mm[:, None]
-        out = np.zeros(self.first.shape[1:])
-        for k in range(out.shape[1]):
+        _, C, K = self.first.shape
+        out = np.zeros((C, K))
+        for k in range(K):
             counts, start = self.count[angle, :, k], int(self.first[angle, 0, k])
             paths = self.records[start : start + int(counts.sum())].astype(float)
             weight = np.exp(-power * paths @ rates[k])

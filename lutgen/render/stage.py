@@ -1,4 +1,4 @@
-"""A stage on the device: head, maps, light and skin as the renderer's kernels read them (kernels/scene.cl, light.cl)."""
+"""A stage on the device: head, maps, light and skin as the renderer's kernels read them (kernels/scene.cl)."""
 
 from __future__ import annotations
 
@@ -23,8 +23,13 @@ PLAIN = {"chromophore": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0), "
 WAVE = 10
 BASE = "lanes", "rng", "trace", "scene", "light", "paths", "moments"
 TALLIES = ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS", "HITS", "BACKS", "MISSES", "REJECTED", "BOUNCES", "BROKEN")
-"""What kernels count: rays by kind (the first four), camera rays that met skin, on back faces; exits without a surface or
-on one that faces away; paths from skin to skin; samples that were not finite."""
+"""What kernels count: rays by kind (the first four); camera rays that met skin, and those on back faces; exits without
+a surface, or on one that faces away; paths from skin to skin; samples that were not finite."""
+PIXELS = {"cpu": 64, "gpu": 1}
+"""Pixels that one work-item takes in turn."""
+CANDIDATES, STRIDE, SKY_CELLS, LEAST_SKY = 4, 1, 64, 0.25
+"""Directions into the surroundings that one is drawn from, in which order of sine; cells along a side of the table that
+they are drawn by, and what each counts at least, as a share of the mean radiance."""
 STUDIO_ROWS, MOST_ROWS = 256, 1024
 _LOBES, _EXIT_MEANS = lighting.ggx_albedo().shape[0], len(lighting.exit_means())
 
@@ -49,6 +54,7 @@ class Stage:
 
     device: ocl.Device
     luts: LutSet
+    shape: Mesh
     view: np.ndarray
     arguments: tuple
     width: int
@@ -71,6 +77,8 @@ def open_stage(
     grid = luts.color_lut.grid
     for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin):
         in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
+    if look.oxygenation != luts.oxygenation:
+        luts = luts.expand(oxygenation=look.oxygenation)
     width = max(device.lanes, 4)
     tree = bvh.build(shape.positions_mm, shape.triangles, width)
     textures = {name: _texels(values, PLAIN[name]) for name, values in _named(given, look).items()}
@@ -80,10 +88,19 @@ def open_stage(
     arrays = (
         tree.boxes, tree.children, tree.triangles, tree.numbers, view,
         np.concatenate([shape.positions_mm, shape.normals, uv], axis=1).astype("f4"), shape.triangles.astype("i4"),
-        *(textures[name] for name in PLAIN), pores.texture(), radiance, lighting.ggx_albedo().astype("f4"),
-        waves(luts, look.oxygenation),
+        *(textures[name] for name in PLAIN), pores.texture(), radiance, _sky(radiance[..., :3]),
+        lighting.ggx_albedo().astype("f4"), waves(luts, look.oxygenation),
     )  # fmt: skip
-    return Stage(device, luts, view, tuple(ocl.buffer(device, values) for values in arrays), width)
+    return Stage(device, luts, shape, view, tuple(ocl.buffer(device, values) for values in arrays), width)
+
+
+def items(stage: Stage, pixels: int) -> int:
+    """Work-items that take that many pixels."""
+    return -(-pixels // _pixels(stage))
+
+
+def _pixels(stage: Stage) -> int:
+    return PIXELS["gpu" if stage.device.kind == "gpu" else "cpu"]
 
 
 def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constants: float):
@@ -93,11 +110,13 @@ def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constan
         "F0": float(lighting.fresnel(np.ones(1))[0]), "SECOND_LOBE": lighting.SECOND_LOBE,
         "SECOND_WEIGHT": lighting.SECOND_WEIGHT, "ENTRY": stage.luts.paths.entry,
         **{name: number for number, name in enumerate(TALLIES)}, "TALLIES": len(TALLIES),
+        "PIXELS": _pixels(stage), "CANDIDATES": CANDIDATES, "STRIDE": STRIDE, "SKY_CELLS": SKY_CELLS,
+        "TURN_COSINE": float(np.cos(2 * np.pi / CANDIDATES)), "TURN_SINE": float(np.sin(2 * np.pi / CANDIDATES)),
     }  # fmt: skip
     text = ocl.struct_source(stage.device, (("view_t", VIEW), *structs)) + ocl.source(*BASE, *names)
     whole = {name: value for name, value in (fixed | constants).items() if isinstance(value, int)}
     reals = {name: value for name, value in (fixed | constants).items() if isinstance(value, float)}
-    return ocl.kernel(stage.device, entry, "".join(f"#define {n} {v:.9g}f\n" for n, v in reals.items()) + text, whole)
+    return ocl.kernel(stage.device, entry, "".join(f"#define {n} {v:.9e}f\n" for n, v in reals.items()) + text, whole)
 
 
 def waves(luts: LutSet, oxygenation: float) -> np.ndarray:
@@ -105,7 +124,7 @@ def waves(luts: LutSet, oxygenation: float) -> np.ndarray:
     nm, extra = luts.paths.wavelength_nm, luts.absorbers
     one, none = np.ones_like(nm), np.zeros_like(nm)
     absorbed = (
-        chromophores.epidermis(nm, one, one), chromophores.epidermis(nm, one, none), chromophores.epidermis(nm, none, one),
+        *(chromophores.epidermis(nm, melanin, eu) for melanin, eu in ((one, one), (one, none), (none, one))),
         chromophores.dermis(nm, one, oxygenation), extra.epidermis, extra.dermis, luts.paths.nu_per_mm,
     )  # fmt: skip
     return np.concatenate([np.stack(absorbed, axis=1), luts.weights], axis=1).astype("f4")
@@ -143,6 +162,19 @@ def _surroundings(around: np.ndarray | None) -> np.ndarray:
     else:
         radiance = environment.resampled(around, MOST_ROWS) if len(around) > MOST_ROWS else around
     return np.concatenate([radiance, np.zeros((*radiance.shape[:2], 1))], axis=-1).astype("f4")
+
+
+def _sky(radiance: np.ndarray) -> np.ndarray:
+    """Mean luminance [64, 64] of the surroundings by cells of an octahedron, unfolded with the sky in the middle."""
+    finer = np.repeat(np.repeat(radiance, k := -(-STUDIO_ROWS // len(radiance)), axis=0), k, axis=1)
+    ways, angle = environment.directions(len(finer))
+    p = ways / np.abs(ways).sum(axis=-1, keepdims=True)
+    x, z = (np.where(p[..., 1] < 0, np.copysign(1 - np.abs(p[..., 2 - i]), p[..., i]), p[..., i]) for i in (0, 2))
+    column, row = (np.minimum((0.5 + 0.5 * v) * SKY_CELLS, SKY_CELLS - 1).astype(int) for v in (x, z))
+    cell = (row * SKY_CELLS + column).ravel()
+    light = np.bincount(cell, (finer.sum(axis=-1) * angle).ravel(), SKY_CELLS**2)
+    mean = light / np.maximum(np.bincount(cell, angle.ravel(), SKY_CELLS**2), 1e-9)
+    return np.maximum(mean, max(LEAST_SKY * mean.mean(), 1e-20)).astype("f4")
 
 
 def _view(

@@ -12,9 +12,10 @@ from lutgen import device as ocl
 from lutgen.render import exits, stage
 from lutgen.render.stage import Stage
 
-MOMENTS = 10
-PIXELS = {"cpu": 64, "gpu": 1}
-"""Pixels that one work-item takes in turn."""
+GROUP = 5
+"""Samples whose walks go evenly near and far: together one estimate. It divides 20, 50, 500."""
+DRAWS = 4
+"""Records that stand for one wavelength's paths through a cell."""
 REACH = 1.5
 """How far above and below the tangent plane an exit is looked for, in units of its distance."""
 
@@ -22,20 +23,19 @@ REACH = 1.5
 class Walk(Protocol):
     """An opened way to take samples.
 
-    `group`: samples that make one whole estimate; counts of samples are multiples of it. `facts`: for the manifest.
+    `group`: samples that make one whole estimate; counts of samples are multiples of it. `pixels`: how many each call
+    must take, with one estimate each; None: any, and any number of samples. `facts`: for the manifest.
     """
 
     group: int
     facts: dict
 
+    @property
+    def pixels(self) -> int | None: ...
+
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         """Add samples first ... first + samples - 1 of the pixels begin ... end - 1 to the buffers of moments
-        [pixels, 10] f4 and of tallies [items, TALLIES] u4; `items(stage, end - begin)` rows of it are used."""
-
-
-def items(stage: Stage, pixels: int) -> int:
-    """Work-items for that many pixels."""
-    return -(-pixels // PIXELS["gpu" if stage.device.kind == "gpu" else "cpu"])
+        [pixels, 10] f4 and of tallies [items, TALLIES] u4, of which `stage.items(on, end - begin)` rows are used."""
 
 
 @dataclass
@@ -46,11 +46,12 @@ class Flat:
     kernel: object
     tables: tuple
     facts: dict
-    group: int = 1
+    group: int = GROUP
+    pixels: int | None = None
 
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         numbers = (np.uint32(v) for v in (begin, end, first, samples))
-        shape = (items(self.stage, end - begin),)
+        shape = (stage.items(self.stage, end - begin),)
         ocl.launch(
             self.stage.device, self.kernel, shape, *self.stage.arguments, *self.tables, *numbers, moments, tallies
         )
@@ -58,11 +59,12 @@ class Flat:
 
 def flat(on: Stage, seed: int = 0, photons: int = exits.EXITS) -> Flat:
     """Trace the exits of the stage's skin and open the flat walk over them."""
-    skin = tuple(float(v) for v in on.view["chromophores"])
+    melanin, eumelanin, hemoglobin = (float(v) for v in on.view["chromophores"])
+    skin = melanin, eumelanin, hemoglobin
     found = exits.trace(on.device, on.luts, skin, photons, seed)
     built = stage.kernel(
-        on, "flat", "places", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1], SECTORS=exits.SECTORS,
-        LEAST_COSINE=float(found.cosines[0]), REACH=REACH, PIXELS=PIXELS["gpu" if on.device.kind == "gpu" else "cpu"],
+        on, "flat", "places", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1],
+        SECTORS=exits.SECTORS, GROUP=GROUP, DRAWS=DRAWS, LEAST_COSINE=float(found.cosines[0]), REACH=REACH,
     )  # fmt: skip
     color, sigma = found.color(on.luts, skin)
     facts = {

@@ -162,8 +162,9 @@ def records(
 ) -> Iterator[tuple[int, np.ndarray]]:  # fmt: skip
     """Yield (wavelength index, exits [n, 3]) block by block; columns: radius, path, path in the epidermis, mm.
 
-    With `cosine`, the entry's inside the skin, rows have a fourth column: the cosine of the exit's azimuth from the way
-    along the surface that the light came in with. `life` is an OpenCL expression for how long a photon lives, in place of the life that is drawn (see the kernel).
+    With `cosine`, the entry's inside the skin, rows have a fourth column: the cosine of the exit's azimuth from the
+    way along the surface that the light came in with. `life` is an OpenCL expression for how long a photon lives, in
+    place of the life that is drawn (see the kernel).
     """
     device = device or ocl.choose()
     key = {round(nm * 1000): k for k, nm in enumerate(medium.wavelength_nm)}
