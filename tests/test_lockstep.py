@@ -40,7 +40,7 @@ def walked(given: np.ndarray, through: Medium, depths: distance.Depths | None = 
     """Exits of entries and the tally."""
     device, tally = ocl.choose(), lockstep.Tally()
     K = len(through.wavelength_nm)
-    whole = lockstep.Part(**({"begin": 0, "end": len(given) // K, "first": 0, "samples": K} | part))
+    whole = queues.Part(**({"begin": 0, "end": len(given) // K, "first": 0, "samples": K} | part))
     buffers = ocl.buffer(device, given), ocl.buffer(device, np.zeros(len(given), queues.EXIT))
     inside = () if depths is None else tuple(distance.buffers(device, depths))
     lockstep.walk(through, *buffers, whole, seed, device, tally, inside)

@@ -41,13 +41,14 @@ class Depths:
         return self.middles.nbytes + self.rows.nbytes + self.values.nbytes
 
 
-def spacing(epidermis_mm: float, extent_mm: np.ndarray) -> float:
-    """Cell size in mm: a twentieth of the smallest extent or 0.5 mm, whichever is less.
+def spacing(extent_mm: np.ndarray) -> float:
+    """Cell size in mm: 0.5, or a quarter of the mesh's least extent where that is less.
 
-    Depths near the surface are read as value over slope, so that a cell may be wider than the epidermis: what a cell
-    must resolve is the mesh, whose edges are 2 to 3 mm long, and features twice the epidermis thick.
+    Measured against exact distances on a scan with edges 3 mm long and on the built-in head (2 mm): half of all depths
+    near the surface are exact to 0.2 um (cells on flat triangles are), 99 % to 0.02 and 0.05 mm, 1 mm cells to 0.06 mm on
+    the scan. A feature thinner than twice the epidermis and a cell is not resolved.
     """
-    return float(min(0.5, max(2.5 * epidermis_mm, 0.1), np.min(extent_mm) / 4))
+    return float(min(0.5, np.min(extent_mm) / 4))
 
 
 def of_mesh(
@@ -57,7 +58,7 @@ def of_mesh(
     """Depths under a mesh, from the cache where they are there; InputError for one that cannot be closed."""
     positions, corners, notes = closed.surface(positions_mm, triangles)
     low, high = positions.min(axis=0), positions.max(axis=0)
-    cell = spacing(epidermis_mm, high - low) if spacing_mm is None else spacing_mm
+    cell = spacing(high - low) if spacing_mm is None else spacing_mm
     band = (-2 * cell, epidermis_mm + _BELOW_MM)
     size = np.array([cell, *band])
     code = np.frombuffer(ocl.source("trace", "depth", "distance").encode(), "u1")

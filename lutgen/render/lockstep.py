@@ -6,13 +6,13 @@ exit weighs exp(-(mu_e - nu) Le - (mu_d - nu) Ld).
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from lutgen import baking
+from lutgen import baking, expansion
 from lutgen import device as ocl
-from lutgen.render import distance, queues
+from lutgen.render import distance, queues, stage
 from lutgen.render.stage import Stage
 from lutgen.solvers.path_table import Medium
 from lutgen.tissue import Skin
@@ -23,24 +23,14 @@ JOB = np.dtype(
 )
 RESULT = np.dtype([(name, "u4") for name in ("escaped", "unfinished", "entered", "lost")] + [("events", "u8")])
 _STRUCTS = (*queues.STRUCTS[:2], ("job_t", JOB), ("result_t", RESULT))
-BLOCK = {"cpu": 2048, "gpu": 128}
+REACH = 1.5
+"""How far above and below the tangent plane an exit is looked for, in units of its distance."""
+BLOCK = {"cpu": queues.BLOCK, "gpu": queues.BLOCK // 16}
 """Pixels that one work-item walks in turn; random streams are keyed by their number."""
 STEPS_PER_PHOTON = 100_000
 """Steps that a block's photons may take on average: far more than any skin's absorption leaves them."""
 _GROUPS, _TURNS = 2**13, 16  # of pixels and of walks from skin to skin, in a stream's number
 _EVENTS_PER_LAUNCH = 4e7  # half a second of the slower walk on two cores
-
-
-@dataclass(frozen=True)
-class Part:
-    """What a queue holds: samples first ... first + samples - 1 of the pixels begin ... end - 1, one after the other;
-    counts of samples are multiples of K. `turn`: how often their walks have been from skin to skin."""
-
-    begin: int
-    end: int
-    first: int
-    samples: int
-    turn: int = 0
 
 
 @dataclass
@@ -67,7 +57,7 @@ def kernel(device: ocl.Device, inside: bool, before: str = ""):
     return ocl.kernel(device, names[-1], text, {"W": device.lanes})
 
 
-def jobs(medium: Medium, part: Part, seed: int, size: int) -> np.ndarray:
+def jobs(medium: Medium, part: queues.Part, seed: int, size: int) -> np.ndarray:
     """Jobs of `size` pixels of one estimate at one wavelength each.
 
     They are keyed by pixel, estimate and turn, so that no exit depends on how a picture was cut into parts whose first
@@ -91,7 +81,7 @@ def jobs(medium: Medium, part: Part, seed: int, size: int) -> np.ndarray:
 
 
 def walk(
-    medium: Medium, entries, exits, part: Part, seed: int, device: ocl.Device, tally: Tally, depths: tuple = (),
+    medium: Medium, entries, exits, part: queues.Part, seed: int, device: ocl.Device, tally: Tally, depths: tuple = (),
     before: str = "",
 ) -> None:  # fmt: skip
     """Walk a queue on the device and add to the tally: inside the mesh of distance.buffers, or under flat skin."""
@@ -124,11 +114,30 @@ def inside(on: Stage, seed: int = 0) -> queues.Staged:
 def _staged(on: Stage, seed: int, facts: dict, depths: tuple) -> queues.Staged:
     skin, tally = on.luts.manifest["recipe"]["skin"], Tally()
     medium, _ = baking.skin_medium(Skin(0.02, 0.7, 0.01, **skin), on.luts.paths.wavelength_nm)
+    medium = replace(medium, nu_per_mm=least_absorption(on))
+    waves = stage.waves(on.luts, on.luts.oxygenation)
+    waves[:, stage.NU] = medium.nu_per_mm
+    here = replace(on, arguments=(*on.arguments[:-1], ocl.buffer(on.device, waves)))
 
-    def step(entries, exits, part: Part) -> int:
+    def step(entries, exits, part: queues.Part) -> int:
         before = tally.events
         walk(medium, entries, exits, part, seed, on.device, tally, depths)
         facts["photons"] = asdict(tally)
         return tally.events - before
 
-    return queues.staged(on, step, facts, flat=not depths)
+    return queues.staged(here, step, facts, not depths, REACH)
+
+
+def least_absorption(on: Stage) -> np.ndarray:
+    """The least absorption [K] of any texel's epidermis or dermis, 1/mm: how fast lives may end.
+
+    It is linear in melanosome and blood fractions and in the eumelanin ratio, so least where each is least or most.
+    """
+    columns, rows = on.view["chromophore_size"]
+    ratios = ocl.read(on.device, on.arguments[stage.CHROMOPHORE_MAP], np.empty((rows, columns, 4), "f2"))[..., :3]
+    ends = np.stack([ratios.min(axis=(0, 1)), ratios.max(axis=(0, 1))]).astype(float)
+    allowed = on.view["chromophores_low"].astype(float), on.view["chromophores_high"].astype(float)
+    skins = np.clip(on.view["chromophores"] * ends, *allowed)
+    corners = [skin.ravel() for skin in np.meshgrid(*skins.T, indexing="ij")]
+    mu = expansion.coefficients(on.luts.paths.wavelength_nm, on.luts.absorbers, *corners)
+    return 0.999 * np.minimum(mu[0].min(axis=1), mu[1].min(axis=1))  # half floats and shares of texels round
