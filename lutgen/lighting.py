@@ -85,7 +85,7 @@ def exit_means() -> np.ndarray:
     f0 = fresnel(np.ones(1))
     kept = (f0 * (whole - part) + part) * (1 + f0 * (1 / np.maximum(whole, 1e-6) - 1))
     root = np.linspace(0, 1, table.shape[1])
-    return np.trapezoid((1 - kept) * 4 * root**3, root, axis=1)
+    return np.asarray(np.trapezoid((1 - kept) * 4 * root**3, root, axis=1))
 
 
 def entry_of_the_sky() -> float:

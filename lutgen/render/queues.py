@@ -34,10 +34,25 @@ STRUCTS = (("entry_t", ENTRY), ("exit_t", EXIT), ("sample_t", SAMPLE))
 EMPTY = 0xFFFFFFFF
 SLOTS = 2**19
 """Places of a queue at most: 0.1 GB. Every call fills as many, so that random streams do not depend on speed."""
+BLOCK = 2048
+"""Pixels that random streams are keyed by."""
 NEAR_MM = 0.5
 
-WalkStage = Callable[[object, object, int, int], int]
-"""Turns a buffer of ENTRY into one of EXIT: (entries, exits, how many, block for the random streams) -> events."""
+
+@dataclass(frozen=True)
+class Part:
+    """What a queue holds: samples first ... first + samples - 1 of the pixels begin ... end - 1, one after the other;
+    counts of samples are multiples of the wavelengths. `turn`: how often their walks have been from skin to skin."""
+
+    begin: int
+    end: int
+    first: int
+    samples: int
+    turn: int = 0
+
+
+WalkStage = Callable[[object, object, Part], int]
+"""Turns a buffer of ENTRY into one of EXIT: (entries, exits, what they hold) -> events."""
 
 
 @dataclass
@@ -55,7 +70,7 @@ class Staged:
     @property
     def pixels(self) -> int:
         """Pixels of every call but a picture's last."""
-        return max(SLOTS // self.group // 64 * 64, 64)
+        return max(SLOTS // self.group // BLOCK * BLOCK, BLOCK)
 
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         """Add samples of pixels begin ... end - 1."""
@@ -69,8 +84,7 @@ class Staged:
             ocl.launch(device, self.kernels["aim"], shape, *scene, *numbers, entries, queue, tallies)
         for turn in range(2 * int(self.stage.view["bounces"]) + 2):
             with self._timed("walk"):
-                block = (begin // 64 * 0x9E3779B1 + first * 0x85EBCA77 + turn) % 2**32
-                self.events += self.walk(entries, exits, places, block)
+                self.events += self.walk(entries, exits, Part(begin, end, first, samples, turn))
             with self._timed("light"):
                 more = np.uint32(turn), entries, exits, queue, tallies, waiting_buffer
                 ocl.launch(device, self.kernels["gather"], shape, *scene, *numbers, *more)

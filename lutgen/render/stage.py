@@ -20,7 +20,10 @@ from lutgen.scene import Look
 PLAIN = {"chromophore": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0), "normal": (0.5, 0.5, 1.0, 1.0),
          "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
 """What stands for a map that is not given, as in the viewer; a map's missing channels are 1."""
-WAVE = 10
+WAVE, NU = 10, 6
+"""Columns of `waves`, and which of them is the life rate."""
+CHROMOPHORE_MAP = 7
+"""Its place in a stage's arguments."""
 BASE = "lanes", "rng", "trace", "scene", "light", "paths", "moments"
 TALLIES = ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS", "HITS", "BACKS", "MISSES", "REJECTED", "BOUNCES", "BROKEN")
 """What kernels count: rays by kind (the first four); camera rays that met skin, and those on back faces; exits without

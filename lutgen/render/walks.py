@@ -9,15 +9,14 @@ from typing import Protocol
 import numpy as np
 
 from lutgen import device as ocl
-from lutgen.render import exits, stage
+from lutgen.render import exits, lockstep, stage
+from lutgen.render.lockstep import REACH
 from lutgen.render.stage import Stage
 
 GROUP = 5
 """Samples whose walks go evenly near and far: together one estimate. It divides 20, 50, 500."""
 DRAWS = 4
 """Records that stand for one wavelength's paths through a cell."""
-REACH = 1.5
-"""How far above and below the tangent plane an exit is looked for, in units of its distance."""
 
 
 class Walk(Protocol):
@@ -75,5 +74,5 @@ def flat(on: Stage, seed: int = 0, photons: int = exits.EXITS) -> Flat:
     return Flat(on, built, exits.buffers(on.device, found), facts)
 
 
-WALKS: dict[str, Callable[..., Walk]] = {"flat": flat}
+WALKS: dict[str, Callable[..., Walk]] = {"flat": flat, "flat-full": lockstep.flat, "mesh": lockstep.inside}
 """By the name that --walk takes."""
