@@ -3,7 +3,8 @@
 // A photon draws its life -ln(u) / nu at launch, nu being the least absorption any allowed skin has at its
 // wavelength, and ends when its path exceeds it: no roulette, no truncation, no cost per event. One that leaves
 // sooner puts a record in the bank: exit radius, whole path L and path in the epidermis Le, mm. For any skin it
-// weighs exp(-(mu_e - nu) Le - (mu_d - nu) (L - Le)) <= 1.
+// weighs exp(-(mu_e - nu) Le - (mu_d - nu) (L - Le)) <= 1. With RECORD 4 the cosine of the exit's azimuth follows,
+// counted from the way along the surface that oblique light came in with.
 //
 // At the surface a step is mirrored into the tissue and its epidermis path counted on both sides of it; an escape
 // takes the part beyond the surface back. A lane whose photon ended relaunches in place while its block has photons.
@@ -11,6 +12,10 @@
 // Branches that only chance predicts cost the most here. There is one: taken when a lane's photon may leave (hits
 // beyond the critical angle are mirrored without it) or has outlived its life. Random numbers and the scattering
 // angle come first, so that the processor has them done when it has mispredicted.
+
+#ifndef RECORD
+#define RECORD 3
+#endif
 
 // How long the photon of a lane lives, mm. Charts build the walk with another definition, to compare.
 #ifndef LIFE
@@ -34,11 +39,11 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
     const float n = job.n, thickness = job.epidermis_mm, mean_step = 1.0f / job.mu_s, mean_life = 1.0f / job.nu;
     const float critical = sqrt(fmax(1.0f - 1.0f / (n * n), 0.0f));  // at a smaller cosine all is reflected
     const hg_t hg = hg_constants(job.g);
-    __global float *out = bank + (ulong)id * (3 * BLOCK_PHOTONS);
+    __global float *out = bank + (ulong)id * (RECORD * BLOCK_PHOTONS);
 
     rng_t rng = start_streams(job.seed, job.wavelength, job.block);
     uint launched = min((uint)W, job.photons), running = launched, escaped = 0;
-    vf x = 0, y = 0, z = 0, ux = 0, uy = 0, uz = 1, L = 0, Le = 0, shallow = 0;  // shallow = min(z, thickness)
+    vf x = 0, y = 0, z = 0, ux = job.sine, uy = 0, uz = job.cosine, L = 0, Le = 0, shallow = 0;  // shallow = min(z, thickness)
     vf life = LIFE;
     park(&z, &life, ~0u << launched);
     ulong events = 0;
@@ -70,16 +75,19 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
             vi leaves = hit & ~reflects(next_uniform(&rng), steep, n) & MASK(L - beyond <= life);
             ended |= leaves;
             uint left = bits(leaves), gone = bits(ended), count = popcount(gone);
-            float radius[W], path[W], path_e[W];
+            float radius[W], path[W], path_e[W], azimuth[W];
             vf xo = fma(-ux, beyond, x), yo = fma(-uy, beyond, y);
-            STORE(sqrt(xo * xo + yo * yo), radius);
+            vf r = sqrt(xo * xo + yo * yo);
+            STORE(r, radius);
+            if (RECORD == 4) STORE(xo / GREATER(r, (vf)(1e-20f)), azimuth);
             STORE(L - beyond, path);
             STORE(fmax(Le - shallow * per_depth, (vf)(0.0f)), path_e);
             do {  // without a test before the first lap: if no lane left, the next record overwrites it
                 uint i = lowest_bit(left | SIGN_BIT) % W;
-                out[3 * escaped] = radius[i];
-                out[3 * escaped + 1] = path[i];
-                out[3 * escaped + 2] = path_e[i];
+                out[RECORD * escaped] = radius[i];
+                out[RECORD * escaped + 1] = path[i];
+                out[RECORD * escaped + 2] = path_e[i];
+                if (RECORD == 4) out[RECORD * escaped + 3] = azimuth[i];
                 escaped += left != 0;
                 left &= left - 1u;
             } while (left);
@@ -90,9 +98,9 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
             L = SELECT(L, zero, ended);
             Le = SELECT(Le, zero, ended);
             shallow = SELECT(shallow, zero, ended);
-            ux = SELECT(ux, zero, ended);
+            ux = SELECT(ux, (vf)(job.sine), ended);
             uy = SELECT(uy, zero, ended);
-            uz = SELECT(uz, (vf)(1.0f), ended);
+            uz = SELECT(uz, (vf)(job.cosine), ended);
             cosine = SELECT(cosine, (vf)(1.0f), ended);
             p = SELECT(p, zero, ended);
             q = SELECT(q, zero, ended);

@@ -110,13 +110,13 @@ def _parser() -> argparse.ArgumentParser:
 
     view = commands.add_parser("view", help="a window with a face shaded from a LUT set, or a picture of it")
     sheet = commands.add_parser("sheet", help="a picture of every preset on a head")
-    for command in (view, sheet):
+    render = commands.add_parser("render", help="a head by Monte Carlo: the truth that the viewer is compared with")
+    for command in (view, sheet, render):
         command.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
         command.add_argument("--mesh", metavar="FILE", help="GLB, glTF, OBJ or lee-perry-smith (default: built-in)")
         command.add_argument("--mm-per-unit", type=float, help="millimetres per unit of the mesh (default: a guess)")
         command.add_argument("--flip-v", action="store_true", help="turn the mesh's texture coordinates upside down")
         command.add_argument("--maps", metavar="DIR", help="texture maps by name: melanin.png, normal.png, ...")
-        command.add_argument("--compare", metavar="DIR", help="another LUT set, the right half with --set split=set")
         command.add_argument("--albedo", default="recolor", help="a painted albedo: recolor it or invert it to maps")
         command.add_argument(
             "--environment", default="studio", metavar="NAME", help="studio, none or an equirectangular .exr or .hdr"
@@ -126,10 +126,22 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--preset", help="chromophores of a preset: light, dark, ...")
         command.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one value of the look")
         command.add_argument("--size", default=None, help="pixels: 640x360")
-    view.add_argument("--screenshot", metavar="FILE", help="picture to write instead of opening a window")
+    for command in (view, sheet):
+        command.add_argument("--compare", metavar="DIR", help="another LUT set, the right half with --set split=set")
+    view.add_argument("--screenshot", metavar="FILE", help="picture to write instead of a window; .exr: linear")
     view.set_defaults(run="lutgen.commands.pictures.view")
     sheet.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
     sheet.set_defaults(run="lutgen.commands.pictures.sheet")
+
+    render.add_argument("--walk", default="flat", help="flat: as if the skin were flat where light enters (default)")
+    render.add_argument("--spp", type=int, help="samples a pixel (default: 256 where neither time nor noise is given)")
+    render.add_argument("--time", metavar="60s", help="stop after so long: 60s, 5m, 1h")
+    render.add_argument("--noise", type=float, help="stop where a pixel's noise is this ΔE00 on average")
+    render.add_argument("--out", required=True, metavar="FILE.exr", help="picture to write, or to go on with")
+    render.add_argument("--png", metavar="FILE", help="also as the viewer would show it")
+    render.add_argument("--seed", type=int, default=0, help="of the random streams")
+    render.add_argument("--force", action="store_true", help="replace a picture of other options")
+    render.set_defaults(run="lutgen.commands.render.render")
 
     export = commands.add_parser("export", help="a LUT set in the form that engines open")
     export.add_argument("dir", nargs="?", metavar="LUT_DIR", help="LUT set (default: the one that came along)")
@@ -155,9 +167,17 @@ def _parser() -> argparse.ArgumentParser:
     maps.add_argument("--force", action="store_true", help="replace an existing folder of maps")
     maps.set_defaults(run="lutgen.commands.maps.maps_of")
 
-    for command in (bake, swatch, bench):
+    compare = commands.add_parser("compare", help="how far two pictures of a scene are apart, without their noise")
+    compare.add_argument("a", metavar="A", help="EXR that `lutgen render` or `lutgen view` wrote, or any picture")
+    compare.add_argument("b", metavar="B", help="picture of the same size")
+    compare.add_argument("--png", metavar="FILE", help="write A, B and the map of differences side by side")
+    compare.set_defaults(run="lutgen.commands.compare.compare")
+
+    for command in (bake, swatch, bench, render):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (bake, swatch, fit, info, devices, check, bench, figures, chart, stability, view, sheet, export, maps):
+    for command in (
+        bake, swatch, fit, info, devices, check, bench, figures, chart, stability, view, sheet, render, compare, export, maps,
+    ):  # fmt: skip
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

@@ -201,6 +201,12 @@ def buffer(device: Device, data: np.ndarray | int):
         return cl.Buffer(device.context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=np.ascontiguousarray(data))
 
 
+def clear(device: Device, target, size: int) -> None:
+    """Set the first bytes of a device buffer to zero."""
+    with _reported(device):
+        _opencl().enqueue_fill_buffer(device.queue, target, np.zeros(1, "u1"), 0, size)
+
+
 def launch(device: Device, compiled, shape: tuple[int, ...], *arguments) -> None:
     """Run a kernel over a global size and wait for it."""
     local = (1,) * len(shape) if device.kind == "cpu" else None

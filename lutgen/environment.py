@@ -78,10 +78,10 @@ def blurred(radiance: np.ndarray) -> list[np.ndarray]:
     From level 3 on with the GGX lobe of a mirror seen head-on (Karis 2013), weighted by solid angle, so that even
     light stays even; before that each texel is the mean of what it covers.
     """
-    levels = [_resampled(radiance, ROWS >> k) for k in range(_CONVOLVED)]
+    levels = [resampled(radiance, ROWS >> k) for k in range(_CONVOLVED)]
     source, angle = directions(_SOURCE_ROWS)
     flat = source.reshape(-1, 3)
-    light = _resampled(radiance, _SOURCE_ROWS).reshape(-1, 3)
+    light = resampled(radiance, _SOURCE_ROWS).reshape(-1, 3)
     for k in range(_CONVOLVED, LEVELS):
         ways = directions(ROWS >> k)[0]
         alpha2 = (k / (LEVELS - 1)) ** 8  # alpha is the roughness squared, the roughness (k / 7)^2
@@ -95,7 +95,7 @@ def blurred(radiance: np.ndarray) -> list[np.ndarray]:
     return levels
 
 
-def _resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
+def resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
     """Means [rows, 2 rows, 3] of what each texel covers, by solid angle."""
     _, angle = directions(len(radiance))
     down = _shares(len(radiance), rows) * angle[:, 0]

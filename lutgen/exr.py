@@ -21,11 +21,12 @@ REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
 
 @dataclass(frozen=True)
 class Part:
-    """One image: its name, channels [rows, columns] by name, and attributes (any JSON value)."""
+    """One image: its name, channels [rows, columns] by name, attributes (any JSON value); chromaticities once read."""
 
     name: str
     channels: dict[str, np.ndarray]
     attributes: Mapping[str, Any]
+    chromaticities: tuple[float, ...] = REC709
 
     def stack(self, names: str) -> np.ndarray:
         """Channels of one-letter names as one array [rows, columns, len(names)]."""
@@ -72,7 +73,8 @@ def read(path: Path) -> dict[str, Part]:
                 channels = {name: np.array(channel.pixels) for name, channel in part.channels.items()}
                 if not channels:
                     raise ValueError("no pixels")
-                parts[part.name()] = Part(part.name(), channels, attributes)
+                primaries = part.header.get("chromaticities", REC709)  # what a file that names none has
+                parts[part.name()] = Part(part.name(), channels, attributes, tuple(float(v) for v in primaries))
             return parts
     except (RuntimeError, ValueError, IndexError) as error:
         raise InputError(f"{path}: not a whole OpenEXR file of a LUT set ({error}); bake it anew") from error

@@ -58,6 +58,16 @@ def decode_ratio(texel: np.ndarray) -> np.ndarray:
     return RATIO_RANGE * np.asarray(texel, float) ** 3
 
 
+def contrast(full_contrast_melanin: float, melanin: float) -> tuple[float, float]:
+    """Exponents of melanin and hemoglobin ratios on a skin of that melanin: freckles and blotches fade on darker skin.
+
+    >>> contrast(0.0292, 0.0195)
+    (1.0, 1.0)
+    """
+    fade = min(full_contrast_melanin / melanin, 1.0)
+    return fade**0.38, fade**0.15
+
+
 def read(path: Path) -> tuple[np.ndarray, bool]:
     """A picture [rows, columns, 1 or 3 channels], first row lowest, and whether it holds values or texels 0 to 1.
 

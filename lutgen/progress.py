@@ -38,5 +38,6 @@ class Progress:
             self._since = time.perf_counter()
             self._bar.update(self._task, description=stage, total=None, completed=0, rate="")
         else:
-            rate = f"{tally.events / (time.perf_counter() - self._since) / 1e6:.0f} M events/s"
+            unit = getattr(tally, "unit", "events")
+            rate = f"{tally.events / (time.perf_counter() - self._since) / 1e6:.3g} M {unit}/s"
             self._bar.update(self._task, total=tally.of, completed=tally.photons, rate=rate)

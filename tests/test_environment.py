@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lutgen
-from lutgen import environment, exr, hdr
+from lutgen import environment, exr, hdr, lighting, subject
 from lutgen.cli import main
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -130,7 +130,7 @@ def test_even_surroundings_of_radiance_1_light_like_irradiance_pi(plain, tmp_pat
     """Then a skin shows the LUT's own color, and what it reflects does not depend on its place in the picture."""
     even = np.full((8, 16, 3), 1.0)
     (write_exr if kind == "exr" else lambda p, v: write_hdr(p, v, True))(tmp_path / f"even.{kind}", even)
-    stages.set_environment(plain, app.surroundings_of(str(tmp_path / f"even.{kind}")))
+    stages.set_environment(plain, subject.surroundings_of(str(tmp_path / f"even.{kind}")))
     expected = lutgen.load().color(LOOK.melanin, LOOK.eumelanin, LOOK.hemoglobin, space="acescg")
     mirrored = []
     for turn in (0, 77):
@@ -159,18 +159,17 @@ def test_surroundings_turn_with_the_look(plain):
 
 def test_no_surroundings_are_dark_and_the_studio_comes_back(plain):
     before = seen(plain)
-    stages.set_environment(plain, app.surroundings_of("none"))
+    stages.set_environment(plain, subject.surroundings_of("none"))
     assert max(part.max() for part in seen(plain)) == 0
-    stages.set_environment(plain, app.surroundings_of("studio"))
+    stages.set_environment(plain, subject.surroundings_of("studio"))
     assert np.array_equal(seen(plain), before)
 
 
 def test_normalizing_makes_a_file_as_bright_as_the_studio(tmp_path):
     write_exr(tmp_path / "a.exr", 300 * scene_of())
-    made = app.surroundings_of(str(tmp_path / "a.exr"), normalized=True)
+    made = subject.surroundings_of(str(tmp_path / "a.exr"), normalized=True)
     assert made is not None
-    light = importlib.import_module("lutgen.viewer.light")
-    assert environment.mean_radiance(made) == pytest.approx(light.studio_mean())
+    assert environment.mean_radiance(made) == pytest.approx(lighting.studio_mean())
 
 
 @pytest.mark.parametrize(

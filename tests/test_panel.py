@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lutgen
-from lutgen import config, scene
+from lutgen import config, lighting, scene
 from lutgen.axes import Axis
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -216,10 +216,10 @@ def test_another_set_shades_the_right_half(stage, other):
     look = replace(FACING, entry=0, environment=0, light=np.pi, light_azimuth=0, light_elevation=0, transmission=0)
     halves = scattered(stage, replace(look, split="set"))
     for luts, columns in ((lutgen.load(), slice(20, 80)), (other, slice(110, 170))):
-        color = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * passes.SUN
+        color = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
         assert np.abs(halves[60:120, columns] / color - 1).max() < 0.005
     blue = scattered(stage, replace(look, split="set", oxygenation=0.2))
-    color = other.expand(oxygenation=0.2).color(0.03, 0.7, 0.01, space="acescg") * passes.SUN
+    color = other.expand(oxygenation=0.2).color(0.03, 0.7, 0.01, space="acescg") * lighting.SUN
     assert np.abs(blue[60:120, 110:170] / color - 1).max() < 0.005
     right = picking.pick(stage, replace(look, split="set", oxygenation=0.2), 80, 48)
     assert right.linear_srgb == pytest.approx(other.expand(oxygenation=0.2).color(0.03, 0.7, 0.01), rel=1e-5)

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import lutgen
-from lutgen import head, painting, scene
+from lutgen import exr, head, lighting, painting, scene, subject
 from lutgen.cli import main
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -90,8 +90,45 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
     look = Look(entry=0, environment=0, light=np.pi, light_azimuth=0, light_elevation=0, azimuth=0, elevation=0,
                 distance_mm=300, tier=tier, transmission=0)  # fmt: skip
     found = linear(plain, look)[140:180, 140:180]
-    expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * passes.SUN
+    expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
     assert np.abs(found / expected - 1).max() < 0.005
+
+
+def test_where_the_sky_is_hidden_light_comes_from_skin(plain):
+    """Under even light L a surface that sees nothing but skin has c L of it, and gives back c c L."""
+    surface = np.ones((1, 1, 4), "f4")
+    surface[..., 2] = 0
+    luts, look = lutgen.load(), Look(entry=0, light=0, azimuth=0, specular=0, distance_mm=300, environment=1)
+    c = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")
+    stages.set_environment(plain, np.full((8, 16, 3), 0.6))
+    stages.set_map(plain, "surface", surface)
+    found = linear(plain, look)[140:180, 140:180]
+    sunny = linear(plain, replace(look, light=4.0, light_azimuth=180, light_elevation=0, transmission=0))[160, 160]
+    stages.set_map(plain, "surface", None)
+    stages.set_environment(plain, None)
+    assert np.abs(found / (0.6 * c * c) - 1).max() < 0.01  # order 2 of 8 rows
+    assert sunny - found[20, 20] == pytest.approx(c * c * lighting.SUN / np.pi, rel=0.01)
+
+
+def test_an_exr_holds_the_radiance_behind_the_picture(plain, stage, tmp_path):
+    """Light of irradiance pi along the normal leaves a plane with the LUT's color, whatever the exposure."""
+    look = Look(entry=0, environment=0, light=np.pi, light_azimuth=0, light_elevation=0, azimuth=0, elevation=0,
+                distance_mm=300, exposure=3, transmission=0, specular=0, tier="reference")  # fmt: skip
+    app.screenshot(plain, look, tmp_path / "plane.EXR")
+    found = exr.read(tmp_path / "plane.EXR")["view"]
+    expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
+    assert np.abs(found.stack("RGB")[70:90, 70:90] / expected - 1).max() < 0.005
+    assert np.all(found.channels["mask"] == 1)
+    assert found.attributes["look"]["exposure"] == 3
+    app.screenshot(stage, LOOK, tmp_path / "face.exr")
+    face = exr.read(tmp_path / "face.exr")["view"]
+    skin, shown = face.channels["mask"], app.picture(stage, LOOK) @ np.array([0.2126, 0.7152, 0.0722])
+    light = lutgen.color.encode_srgb(face.stack("RGB") @ np.array([0.2126, 0.7152, 0.0722]))
+    assert np.array_equal(np.unique(skin), [0, 0.25, 0.5, 0.75, 1])
+    assert np.corrcoef(light[skin == 1], shown[skin == 1])[0, 1] > 0.98
+    assert np.all(face.stack("RGB")[skin == 0] == 0)
+    with pytest.raises(lutgen.InputError, match=r"picture = .*no.x\.exr: cannot be written"):
+        app.screenshot(stage, LOOK, tmp_path / "no" / "x.exr")
 
 
 def test_a_painted_albedo_is_recolored():
@@ -100,11 +137,11 @@ def test_a_painted_albedo_is_recolored():
     albedo = luts.color(0.01 + 0.02 * rng.random((16, 16)), 0.7, 0.004 + 0.02 * rng.random((16, 16)))
     acescg = lutgen.color.from_xyz(albedo @ np.linalg.inv(lutgen.color.SRGB_FROM_XYZ).T, "acescg")
     expected = acescg / np.median(acescg, axis=(0, 1))
-    assert app.detail(albedo) == pytest.approx(expected, rel=1e-9)
-    gray = app.detail(np.repeat(0.2 + 0.6 * rng.random((8, 8, 1)), 3, axis=-1))
+    assert subject.detail(albedo) == pytest.approx(expected, rel=1e-9)
+    gray = subject.detail(np.repeat(0.2 + 0.6 * rng.random((8, 8, 1)), 3, axis=-1))
     assert np.ptp(gray, axis=-1).max() < 1e-9
     with pytest.raises(lutgen.InputError, match="albedo is black throughout"):
-        app.detail(np.zeros((4, 4, 3)))
+        subject.detail(np.zeros((4, 4, 3)))
 
 
 def test_thin_parts_let_light_through(plain):
@@ -271,21 +308,28 @@ def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_pa
     monkeypatch.setattr(painting, "notes", lambda shape: ("painted",))
     monkeypatch.setattr(painting, "origin_mm", lambda shape: np.array([1.0, 2.0, 3.0]))
     textures_given = {}
-    monkeypatch.setattr(app.mesh, "of", lambda *given: replace(square, textures=textures_given, notes=(str(given),)))
-    shape, found = app.model("a.glb", 2.0, None, True)
+    monkeypatch.setattr(
+        subject.mesh, "of", lambda *given: replace(square, textures=textures_given, notes=(str(given),))
+    )
+    shape, found = subject.model("a.glb", 2.0, None, True)
     assert shape.notes == ("('a.glb', 2.0, True)", "painted")
     assert np.array_equal(shape.positions_mm, np.eye(4, 3) - [1, 2, 3])
     assert found.albedo is None
+    assert found.chromophores is not None
     assert found.chromophores[0, 0, 0] == 2
     textures_given |= {"albedo": np.full((1, 1, 3), 188, "u1"), "normal": pixel + 1}
-    _, found = app.model("a.glb", None, None)
+    _, found = subject.model("a.glb", None, None)
     assert found.chromophores is None  # it is in the albedo already
+    assert found.albedo is not None
+    assert found.normal is not None
     assert found.albedo[0, 0, 0] == pytest.approx(0.503, abs=1e-3)
     assert found.normal[0, 0, 0] == 10
     assert np.all(found.surface == 0.5)
     Image.fromarray(np.full((1, 1), 255, "u1")).save(tmp_path / "occlusion.png")
     Image.new("RGB", (1, 1), (128, 128, 255)).save(tmp_path / "normal.png")
-    _, found = app.model("a.glb", None, str(tmp_path))
+    _, found = subject.model("a.glb", None, str(tmp_path))
+    assert found.surface is not None
+    assert found.normal is not None
     assert found.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
     assert found.normal[0, 0, 2] == 1
     assert found.albedo is not None

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import lutgen
-from lutgen import pores
+from lutgen import lighting, pores, subject
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
-_NAMES = "app", "gl", "light", "passes", "stages"
-app, gl, light, passes, stages = (importlib.import_module(f"lutgen.viewer.{n}") for n in _NAMES)
+_NAMES = "app", "gl", "passes", "stages"
+app, gl, passes, stages = (importlib.import_module(f"lutgen.viewer.{n}") for n in _NAMES)
 LOOK = {"azimuth": 0, "elevation": 0, "environment": 0, "target_mm": (0, 0, 0), "light_size": 0}
 
 
@@ -109,8 +109,8 @@ def test_roughness_grows_with_the_slopes_that_became_invisible():
 
 def test_no_black_outlines_and_no_lost_light():
     """What leaves at a cosine, weighted with it, is 1 on the mean; at grazing a rough skin still lets out most."""
-    table, means = light.ggx_albedo(), light.exit_means()
-    f0 = light.fresnel(np.ones(1))
+    table, means = lighting.ggx_albedo(), lighting.exit_means()
+    f0 = lighting.fresnel(np.ones(1))
     root = np.linspace(0, 1, table.shape[1])
     size = len(table)
     for i in range(size // 4, size):
@@ -121,7 +121,7 @@ def test_no_black_outlines_and_no_lost_light():
     assert 0.9 < means[size // 4 :].min() < means[size // 4 :].max() < 1
     whole, part = table[size // 2, round(0.032 * (size - 1))]
     assert 1 - (f0 * (whole - part) + part) > 0.6
-    assert light.exit_mean() == pytest.approx(means[size // 16], abs=0.01)  # a smooth one is Fresnel's
+    assert lighting.exit_mean() == pytest.approx(means[size // 16], abs=0.01)  # a smooth one is Fresnel's
 
 
 def test_the_detail_of_a_painted_albedo_is_a_ratio_of_colors():
@@ -131,7 +131,7 @@ def test_the_detail_of_a_painted_albedo_is_a_ratio_of_colors():
     albedo = np.full((8, 8, 3), 0.4)
     albedo[0, 0] = 0.2
     albedo[0, 1] = 0.5, 0.2, 0.2
-    found = app.detail(albedo)
+    found = subject.detail(albedo)
     assert found[0, 0] == pytest.approx([0.5, 0.5, 0.5], abs=1e-6)
     assert color.from_acescg(found[0, 1] * 0.4, "srgb") == pytest.approx([0.5, 0.2, 0.2], abs=1e-6)
 

@@ -7,12 +7,12 @@ from collections.abc import Iterable
 import moderngl
 import numpy as np
 
-from lutgen import color, environment, pores, scene
+from lutgen import color, environment, lighting, maps, pores, scene
 from lutgen.errors import in_range
 from lutgen.scene import Look
 
-from . import clock, gl, light, sides, stages
-from .stages import SAMPLES, Stage
+from . import clock, gl, sides, stages
+from .stages import REFLECTED, SAMPLES, Stage
 
 TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
 REFERENCE_FRAMES = 16
@@ -96,11 +96,22 @@ def skin_of(stage: Stage, look: Look) -> dict:
     """Uniforms that say what the look's skin is, and how far the maps change it."""
     grid = stage.sides["none"].luts.color_lut.grid
     axes = grid.melanin, grid.eumelanin, grid.hemoglobin
-    fade = min(stage.full_contrast_melanin / look.melanin, 1.0)  # freckles and blotches show less on darker skin
     return {
-        "chromophores": (look.melanin, look.eumelanin, look.hemoglobin), "contrast": (fade**0.38, fade**0.15),
+        "chromophores": (look.melanin, look.eumelanin, look.hemoglobin),
+        "contrast": maps.contrast(stage.full_contrast_melanin, look.melanin),
         "chromophores_low": tuple(a.low for a in axes), "chromophores_high": tuple(a.high for a in axes),
     }  # fmt: skip
+
+
+def from_skin(stage: Stage, look: Look) -> np.ndarray:
+    """Irradiance [3] from where the head hides the sky: skin of the look's color, lit as skin is on the mean.
+
+    On the mean over all normals a surface has a quarter of the sun's irradiance and all directions' mean of the
+    surroundings'; what that skin in turn lacks of both is left out.
+    """
+    luts = stage.sides["none"].shown
+    color = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")
+    return color * (look.light * lighting.SUN / 4 + look.environment * 0.282095 * stage.irradiance[0])
 
 
 def draw_surface(
@@ -123,19 +134,15 @@ def draw_surface(
     gl.put(
         program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
         shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
-        light_direction=scene.light_direction(look), light_color=look.light * SUN, eye=camera.eye_mm,
+        light_direction=scene.light_direction(look), light_color=look.light * lighting.SUN, eye=camera.eye_mm,
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
-        environment_entry=light.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
+        environment_entry=lighting.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
         environment_levels=0 if around is None else environment.LEVELS,
         environment_turn=tuple(f(np.radians(look.environment_azimuth)) for f in (np.cos, np.sin)),
-        **skin_of(stage, look),
+        from_skin=from_skin(stage, look), **skin_of(stage, look),
     )  # fmt: skip
     seen.render()
-
-
-SUN = np.array([1.0, 0.965, 0.9])
-"""Color of the directional light, linear ACEScg."""
 
 
 def _scatter(
@@ -152,7 +159,7 @@ def _scatter(
             behind=targets["reflected"], detail=targets["detail"], lut_color=tables.color, lut_rings=tables.rings,
             lut_encircled=tables.encircled)  # fmt: skip
     gl.put(program, focal=camera.focal_pixels * SAMPLES, center=tuple(n * SAMPLES / 2 for n in stage.size),
-           taps=0 if split == "scattering" else TAPS[look.tier], sun=tuple(look.light * SUN / np.pi),
+           taps=0 if split == "scattering" else TAPS[look.tier], sun=tuple(look.light * lighting.SUN / np.pi),
            frame=frame)  # fmt: skip
     one.gather.array.render()
     buffer.scissor = None
@@ -172,3 +179,18 @@ def compose(stage: Stage, scattered: str, reflected: str, exposure: float) -> No
 def pixels(stage: Stage) -> np.ndarray:
     """The frame as 8-bit sRGB [height, width, 3], first row on top."""
     return gl.read(stage.targets["pixel_buffer"], kind="f1", components=3)[::-1]
+
+
+def radiance(stage: Stage) -> tuple[np.ndarray, np.ndarray]:
+    """The frame before exposure and tone curve: ACEScg [height, width, 3] and share of skin, first row on top.
+
+    Scattered and reflected light of a pixel's samples averaged; a sample beside the head counts as black.
+    """
+    scattered = gl.read(stage.targets["scattered_buffer"]).astype("f8")
+    mirrored = gl.read(stage.targets["surface_buffer"], attachment=REFLECTED, kind="f2").astype("f8")
+    frames = scattered[..., 3:]
+    light = np.where(frames > 0, scattered[..., :3] / np.maximum(frames, 1) + mirrored[..., :3], 0.0)
+    whole = np.concatenate([light, frames > 0], axis=-1)
+    width, height = stage.size
+    whole = whole.reshape(height, SAMPLES, width, SAMPLES, 4).mean(axis=(1, 3))[::-1]
+    return whole[..., :3], whole[..., 3]

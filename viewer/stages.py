@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
-from lutgen import environment, pores
+from lutgen import environment, lighting, pores
 from lutgen.errors import InputError
 from lutgen.lutset import LutSet
 
@@ -16,6 +16,9 @@ from . import clock, gl, light, sides
 SHADOW_SIZE = 1024
 SAMPLES = 2
 """Pixels shaded along x and y for one shown."""
+LAYERS = "entering", "facing", "skin", "reflected", "detail"
+"""What the surface pass writes, by attachment (viewer/shaders/surface.frag.glsl)."""
+REFLECTED = LAYERS.index("reflected")
 _MAPS = ("normal", "chromophores", "surface", "detail")
 _PLAIN = {"normal": (0.5, 0.5, 1.0, 1.0), "chromophores": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0),
           "detail": (1.0, 1.0, 1.0, 1.0)}  # fmt: skip
@@ -72,7 +75,7 @@ def open_stage(
         size, shown, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS} | {"pores": gl.image(pores.texture(), 1.0)},
-        light.studio_irradiance(), None, gl.table(light.ggx_albedo()), clock.open_clock(),
+        lighting.studio_irradiance(), None, gl.table(lighting.ggx_albedo()), clock.open_clock(),
     )  # fmt: skip
     resize(stage, size)
     return stage
@@ -102,10 +105,10 @@ def set_environment(stage: Stage, radiance: np.ndarray | None) -> None:
     """Exchange the light from all around: radiance [rows, 2 rows, 3] as of `environment.read`; None: the studio."""
     if stage.environment_map is not None:
         gl.free(stage.environment_map)
-    stage.environment_map, stage.irradiance = None, light.studio_irradiance()
+    stage.environment_map, stage.irradiance = None, lighting.studio_irradiance()
     if radiance is not None:
         ways, angles = environment.directions(len(radiance))
-        stage.irradiance = light.irradiance_sh(ways.reshape(-1, 3), radiance.reshape(-1, 3), angles.ravel())
+        stage.irradiance = lighting.irradiance_sh(ways.reshape(-1, 3), radiance.reshape(-1, 3), angles.ravel())
         stage.environment_map = gl.levels(environment.blurred(radiance))
 
 
@@ -113,8 +116,7 @@ def resize(stage: Stage, size: tuple[int, int]) -> None:
     """Make the targets of a frame of that size in pixels."""
     gl.free(*stage.targets.values())
     context, large = gl.context(), (size[0] * SAMPLES, size[1] * SAMPLES)
-    names = "entering", "facing", "skin", "reflected", "detail"
-    layers = {name: gl.texture(large, 4, "f4" if name in ("entering", "skin") else "f2") for name in names}
+    layers = {name: gl.texture(large, 4, "f4" if name in ("entering", "skin") else "f2") for name in LAYERS}
     depth = context.depth_renderbuffer(large)
     cast = context.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
     cast.compare_func = ""

@@ -8,7 +8,7 @@ from math import log10
 from pathlib import Path
 
 import lutgen
-from lutgen import extras, scene
+from lutgen import extras, scene, subject
 from lutgen.charts import drawing
 from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
 from lutgen.errors import MachineError
@@ -51,7 +51,7 @@ def viewing(folder: Path, quick: bool = False, progress: Callable = lambda stage
         return f"left out: {error}"
     extent = QUICK if quick else FULL
     timing, stages = extras.viewer("timing"), extras.viewer("stages")
-    stage = app.open_stage(lutgen.load(), *app.model(None, None, None), extent["size"])
+    stage = app.open_stage(lutgen.load(), *subject.model(None, None, None), extent["size"])
     try:
         told = {"rounds": extent["rounds"], "progress": lambda name: progress(name, None)}
         _, costs = timing.costs(stage, Look(), extent["tiers"], **told)

@@ -10,10 +10,15 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 import lutgen
-from lutgen import extras, manifest, scene
+from lutgen import extras, manifest, scene, subject
 from lutgen.commands import Outcome
 from lutgen.errors import InputError, one_of
+from lutgen.lutset import LutSet
+from lutgen.maps import Maps
+from lutgen.mesh import Mesh
 from lutgen.scene import Look
 
 SHEET_SIZE = "480x480"
@@ -35,18 +40,24 @@ def look_of(options: Namespace) -> Look:
     return scene.changed(look, values)
 
 
-def _opener(options: Namespace, app: ModuleType, look: Look) -> tuple[Callable, tuple[str, ...]]:
-    """What opens the stage that the options describe at a size in pixels, and what is to be said about its head."""
+def shown_of(options: Namespace, look: Look) -> tuple[LutSet, Mesh, Maps, np.ndarray | None, tuple[str, ...]]:
+    """What the options describe: LUT set, head, maps, light from all around, and what is to be said about the head."""
     luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
-    other = None if options.compare is None else manifest.load(Path(options.compare))
-    one_of("albedo", options.albedo, app.ALBEDO)
-    around = app.surroundings_of(options.environment, options.normalize_environment)
-    shape, given = app.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
+    one_of("albedo", options.albedo, subject.ALBEDO)
+    around = subject.surroundings_of(options.environment, options.normalize_environment)
+    shape, given = subject.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
     more = ()
     if options.albedo == "invert":
-        given, more = app.inverted(luts, given, look.eumelanin)
+        given, more = subject.inverted(luts, given, look.eumelanin)
     credit = () if shape.attribution in ("", "built-in") else (shape.attribution,)
-    return partial(app.open_stage, luts, shape, given, other=other, around=around), (*shape.notes, *more, *credit)
+    return luts, shape, given, around, (*shape.notes, *more, *credit)
+
+
+def _opener(options: Namespace, app: ModuleType, look: Look) -> tuple[Callable, tuple[str, ...]]:
+    """What opens the stage that the options describe at a size in pixels, and what is to be said about its head."""
+    other = None if options.compare is None else manifest.load(Path(options.compare))
+    luts, shape, given, around, notes = shown_of(options, look)
+    return partial(app.open_stage, luts, shape, given, other=other, around=around), notes
 
 
 @contextlib.contextmanager
@@ -62,13 +73,13 @@ def _stage(opened: Callable, size: tuple[int, int]) -> Iterator:
 def view(options: Namespace) -> Outcome:
     """Open a window, or draw one picture."""
     look, app = look_of(options), extras.viewer("app")
-    size = app.size_of(options.size or PICTURE_SIZE)
+    size = subject.size_of(options.size or PICTURE_SIZE)
     opened, notes = _opener(options, app, look)
     if options.screenshot is None:
         look = extras.viewer("window").run(opened, look, size, notes)
         return {"look": asdict(look), "notes": list(notes)}, "\n".join(notes) or "closed", 0
     with _stage(opened, size) as stage:
-        app.write(app.picture(stage, look), options.screenshot)
+        app.screenshot(stage, look, options.screenshot)
     said = {"screenshot": options.screenshot, "size": list(size), "look": asdict(look), "notes": list(notes)}
     return said, "\n".join([f"{options.screenshot}: {size[0]} x {size[1]}", *notes]), 0
 
@@ -76,7 +87,7 @@ def view(options: Namespace) -> Outcome:
 def sheet(options: Namespace) -> Outcome:
     """Draw every preset beside the others."""
     look, app = look_of(options), extras.viewer("app")
-    size = app.size_of(options.size or SHEET_SIZE)
+    size = subject.size_of(options.size or SHEET_SIZE)
     opened, notes = _opener(options, app, look)
     with _stage(opened, size) as stage:
         pixels = app.sheet(stage, look)
@@ -88,9 +99,9 @@ def sheet(options: Namespace) -> Outcome:
 
 def bench(options: Namespace) -> Outcome:
     """Time the built-in head: milliseconds by pass and tier, and over the same head without LUT and scattering."""
-    app, timing = extras.viewer("app"), extras.viewer("timing")
-    size = app.size_of(options.size or TIMED_SIZE)
-    result = timing.report(lutgen.load(), *app.model(None, None, None), size)
+    timing = extras.viewer("timing")
+    size = subject.size_of(options.size or TIMED_SIZE)
+    result = timing.report(lutgen.load(), *subject.model(None, None, None), size)
     return result, _table(result), 0
 
 

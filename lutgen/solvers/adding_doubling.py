@@ -143,10 +143,11 @@ def _thin_slab(A: np.ndarray, B: np.ndarray, thickness: float) -> tuple[np.ndarr
     return R, transfer[..., :N, :N] + transfer[..., :N, N:] @ R
 
 
-def stack(layers: list[Layer], n_above: float = 1.0, n_below: float = 1.0, nodes: int = NODES):
-    """Diffuse, specular, transmitted share and absorbed share per layer of light along the normal from above.
+def stack(layers: list[Layer], n_above: float = 1.0, n_below: float = 1.0, nodes: int = NODES, incident: int = -1):
+    """Diffuse, specular, transmitted share and absorbed share per layer of light from above: along the normal, or along
+    the quadrature node numbered `incident` of `directions`.
 
-    `diffuse` excludes the specular share at normal incidence from air; the two and transmission and absorption
+    `diffuse` excludes the specular share; the two and transmission and absorption
     sum to 1. Semi-infinite only as the last layer.
     """
     if not layers:
@@ -174,9 +175,9 @@ def stack(layers: list[Layer], n_above: float = 1.0, n_below: float = 1.0, nodes
                 weight,
             )
             parts.append((R, T, R, T))
-    incident = np.zeros(total)
-    incident[-1] = 1.0
-    return _solve(parts, incident, semi_infinite)
+    light = np.zeros(total)
+    light[incident] = 1.0
+    return _solve(parts, light, semi_infinite)
 
 
 def _in_medium(base: np.ndarray, weight: np.ndarray, n: float, dense: float):

@@ -31,7 +31,7 @@ _ROWS = 64
 _FIXED_POINT = 2.0**30
 
 JOB = np.dtype(
-    [("mu_s", "f4"), ("g", "f4"), ("nu", "f4"), ("n", "f4"), ("epidermis_mm", "f4")]
+    [("mu_s", "f4"), ("g", "f4"), ("nu", "f4"), ("n", "f4"), ("epidermis_mm", "f4"), ("sine", "f4"), ("cosine", "f4")]
     + [(name, "u4") for name in ("seed", "wavelength", "block", "photons", "max_steps")]
 )
 RESULT = np.dtype([("escaped", "u4"), ("unfinished", "u4"), ("events", "u8")])
@@ -69,11 +69,13 @@ def block_photons(device: ocl.Device) -> int:
     return BLOCK_PHOTONS["gpu" if device.kind == "gpu" else "cpu"]
 
 
-def walk_kernel(device: ocl.Device, life: str = ""):
-    """The built kernel of kernels/path_table.cl; `life` replaces its LIFE."""
+def walk_kernel(device: ocl.Device, life: str = "", record: int = 3):
+    """The built kernel of kernels/path_table.cl; `life` replaces its LIFE, `record` 4 adds azimuths."""
     text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "path_table")
     text = f"#define LIFE {life}\n{text}" if life else text
-    return ocl.kernel(device, "walk", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device)})
+    return ocl.kernel(
+        device, "walk", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device), "RECORD": record}
+    )
 
 
 def tabulate_kernel(device: ocl.Device, rings: int, slices: int):
@@ -91,13 +93,14 @@ def kernel_hash(device: ocl.Device) -> str:
     ]
 
 
-def _jobs(medium: Medium, photons: int, seed: int, block: int) -> np.ndarray:
-    """One job per block, ordered by wavelength, then block."""
+def _jobs(medium: Medium, photons: int, seed: int, block: int, cosine: float = 1.0) -> np.ndarray:
+    """One job per block, ordered by wavelength, then block; light enters at that cosine inside the skin."""
     K, blocks = len(medium.wavelength_nm), -(-photons // block)
     jobs = np.zeros((K, blocks), JOB)
     for field, values in (("mu_s", medium.mu_s_per_mm), ("g", medium.g), ("nu", medium.nu_per_mm)):
         jobs[field] = np.asarray(values)[:, None]
     jobs["n"], jobs["epidermis_mm"], jobs["seed"] = medium.n, medium.epidermis_mm, seed
+    jobs["cosine"], jobs["sine"] = cosine, np.sqrt(1 - cosine**2)
     jobs["wavelength"] = np.rint(np.asarray(medium.wavelength_nm) * 1000).astype("u4")[:, None]
     jobs["block"] = np.arange(blocks)
     jobs["photons"] = block
@@ -110,7 +113,7 @@ def _jobs(medium: Medium, photons: int, seed: int, block: int) -> np.ndarray:
 
 def _launches(
     medium: Medium, photons: int, seed: int, device: ocl.Device, blocks_per_launch: int | None, tally: Tally,
-    life: str = "",
+    life: str = "", cosine: float = 1.0, record: int = 3,
 ) -> Iterator[tuple[np.ndarray, np.ndarray, object, object]]:  # fmt: skip
     """Walk all blocks; yield jobs, results, and the device buffers of bank and results after each launch."""
     whole("photons", photons, *PHOTONS)
@@ -124,15 +127,15 @@ def _launches(
             f"needs at least {least:.3g} /mm here, method adding-doubling any value"
         )
     block = block_photons(device)
-    jobs = _jobs(medium, photons, seed, block)
+    jobs = _jobs(medium, photons, seed, block, cosine)
     low, high = _BLOCKS_PER_LAUNCH["gpu" if device.kind == "gpu" else "cpu"]
     if blocks_per_launch is not None:
         whole("blocks_per_launch", blocks_per_launch, 1, 2**20)
     fit = _EVENTS_PER_LAUNCH / (block * (steps_per_life + 1))
     size = blocks_per_launch or int(np.clip(fit, low, high))
     size = min(size, len(jobs))
-    walk = walk_kernel(device, life)
-    bank = ocl.buffer(device, 12 * block * size)
+    walk = walk_kernel(device, life, record)
+    bank = ocl.buffer(device, 4 * record * block * size)
     tally.of = photons * len(medium.wavelength_nm)
     for start in range(0, len(jobs), size):
         part = jobs[start : start + size]
@@ -155,16 +158,19 @@ def walk_only(medium: Medium, photons: int, device: ocl.Device, tally: Tally, se
 
 def records(
     medium: Medium, photons: int, seed: int = 0, device: ocl.Device | None = None, tally: Tally | None = None,
-    life: str = "",
+    life: str = "", cosine: float | None = None,
 ) -> Iterator[tuple[int, np.ndarray]]:  # fmt: skip
     """Yield (wavelength index, exits [n, 3]) block by block; columns: radius, path, path in the epidermis, mm.
 
-    `life` is an OpenCL expression for how long a photon lives, in place of the life that is drawn (see the kernel).
+    With `cosine`, the entry's inside the skin, rows have a fourth column: the cosine of the exit's azimuth from the
+    way along the surface that the light came in with. `life` is an OpenCL expression for how long a photon lives, in
+    place of the life that is drawn (see the kernel).
     """
     device = device or ocl.choose()
     key = {round(nm * 1000): k for k, nm in enumerate(medium.wavelength_nm)}
-    for jobs, results, bank, _ in _launches(medium, photons, seed, device, None, tally or Tally(), life):
-        exits = ocl.read(device, bank, np.empty((len(jobs), block_photons(device), 3), "f4"))
+    record, entry = (3, 1.0) if cosine is None else (4, cosine)
+    for jobs, results, bank, _ in _launches(medium, photons, seed, device, None, tally or Tally(), life, entry, record):
+        exits = ocl.read(device, bank, np.empty((len(jobs), block_photons(device), record), "f4"))
         for job, result, rows in zip(jobs, results, exits, strict=True):
             yield key[int(job["wavelength"])], rows[: result["escaped"]]
 

@@ -7,8 +7,9 @@ uniform vec3 irradiance_sh[9];    // cosine-convolved harmonics of the same ligh
 
 vec3 studio(vec3 d, float roughness) {
     vec3 light = mix(vec3(0.088, 0.083, 0.080), vec3(0.29, 0.31, 0.335), smoothstep(-0.6, 0.9, d.y));
+    float widened = 1.2 * roughness * roughness * roughness;
     for (int i = 0; i < STUDIO_LOBES; i++) {
-        float sharp = STUDIO_SHARPNESS[i] / (1.0 + 1.6 * STUDIO_SHARPNESS[i] * roughness * roughness);
+        float sharp = STUDIO_SHARPNESS[i] / (1.0 + widened * STUDIO_SHARPNESS[i]);
         light += STUDIO_COLOR[i] * (sharp / STUDIO_SHARPNESS[i]) * exp(sharp * (dot(d, STUDIO_DIRECTION[i]) - 1.0));
     }
     return light;
@@ -19,11 +20,15 @@ vec3 unturned(vec3 d) {
     return vec3(d.x * environment_turn.x - d.z * environment_turn.y, d.y, d.x * environment_turn.y + d.z * environment_turn.x);
 }
 
-vec3 reflected(vec3 d, float roughness) {
-    d = unturned(d);
-    if (environment_levels == 0) return environment * studio(d, roughness);
+// What a rough mirror of normal n shows of the surroundings, seen from v at cosine nv. Its lobe around the mirrored
+// direction narrows toward grazing, where that of a rough one leans back to n. Fitted to the lobes' own means of the studio
+// (roughness 0.15 to 1, all cosines): off by 13 % RMS; one width for all cosines that does not lean was off by 47 %.
+vec3 reflected(vec3 n, vec3 v, float nv, float roughness) {
+    vec3 d = unturned(normalize(mix(reflect(-v, n), n, 0.6 * pow(roughness * (1.0 - nv), 2.0))));
+    float seen = roughness * pow(max(nv, 0.2), 1.0 / 3.0);
+    if (environment_levels == 0) return environment * studio(d, seen);
     vec2 at = vec2(atan(d.x, -d.z) / 6.28318531 + 0.5, acos(clamp(d.y, -1.0, 1.0)) / 3.14159265);
-    return environment * textureLod(environment_map, at, sqrt(roughness) * float(environment_levels - 1)).rgb;
+    return environment * textureLod(environment_map, at, sqrt(seen) * float(environment_levels - 1)).rgb;
 }
 
 // Irradiance from the hemisphere around n (Ramamoorthi & Hanrahan 2001).

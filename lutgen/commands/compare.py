@@ -1,0 +1,54 @@
+"""Two pictures: compare."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from lutgen.commands import Outcome
+from lutgen.errors import cannot_write
+
+if TYPE_CHECKING:
+    from lutgen.render.difference import Difference
+
+
+def compare(options: Namespace) -> Outcome:
+    """`lutgen compare`: how far B is from A, without their noise."""
+    from lutgen.render import beside, difference, pictures
+
+    a, b = pictures.read(options.a), pictures.read(options.b)
+    found = difference.compare(a, b)
+    if options.png is not None:
+        try:
+            beside.draw(a, b, found).save(options.png, format="PNG")
+        except OSError as error:
+            raise cannot_write("png", options.png, error) from error
+    names = "mean", "median", "p95"
+    result = {
+        "a": options.a, "b": options.b, "size": list(a.acescg.shape[1::-1]), "boxes": found.boxes,
+        "delta_e00": {name: asdict(getattr(found, name)) for name in names}
+        | {"max": found.most, "noise_alone": dict(zip(names, found.noise_alone, strict=True))},
+        "bias": {"lightness": asdict(found.lightness)}
+        | {name: asdict(one) for name, one in zip("rgb", found.channels, strict=True)},
+        "noise_over_sigma": found.noise_over_sigma, "notes": list(found.notes),
+    }  # fmt: skip
+    return result, _text(found), 0
+
+
+def _text(found: Difference) -> str:
+    """The figures as a user reads them."""
+    figures = {"mean": found.mean, "median": found.median, "p95": found.p95}
+    shown = ", ".join(f"{name} {one.value:.3f} ± {one.sigma:.3f}" for name, one in figures.items())
+    shares = ", ".join(
+        f"{name} {100 * one.value:+.2f} ± {100 * one.sigma:.2f} %"
+        for name, one in zip("RGB", found.channels, strict=True)
+    )
+    lines = [
+        f"ΔE00 of {found.boxes} boxes, noise taken off: {shown}, most {found.most:.3f}",
+        f"B over A: L* {found.lightness.value:+.3f} ± {found.lightness.sigma:.3f}, {shares}",
+    ]
+    if found.noise_over_sigma is not None:
+        alone = ", ".join(f"{name} {v:.3f}" for name, v in zip(figures, found.noise_alone, strict=True))
+        lines.append(f"noise alone would leave {alone}; within boxes it is {found.noise_over_sigma:.2f} × its sigma")
+    return "\n".join([*lines, *found.notes])

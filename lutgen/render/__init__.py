@@ -1,0 +1,1 @@
+"""Heads traced offline: the ground truth of the viewer."""

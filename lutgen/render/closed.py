@@ -1,0 +1,79 @@
+"""The closed surface that a walk inside a mesh needs: corners welded, a cut neck capped, anything else refused."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lutgen.errors import InputError
+
+_WELD_MM = 1e-3
+_BASE = 0.1
+"""Share of the height, from the bottom, in which an open edge is where a neck or a bust was cut."""
+
+
+def surface(positions_mm: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Positions [V, 3], triangles [T, 3] of the closed surface and notes of what was mended.
+
+    Corners within 0.001 mm are one (files double them along seams); triangles without area are dropped; a hole whose
+    rim lies in the lowest tenth of the height is a cut neck, and gets a fan. Raises InputError for other holes and
+    for triangles that face each other or inward.
+    """
+    _, first, number = np.unique(np.round(positions_mm / _WELD_MM), axis=0, return_index=True, return_inverse=True)
+    positions, corners = np.asarray(positions_mm, float)[first], number.ravel()[triangles]
+    a, b, c = corners.T
+    whole = (a != b) & (b != c) & (c != a)
+    corners, notes = corners[whole], []
+    if not len(corners):
+        raise InputError("mesh: all its triangles are degenerate; export it anew")
+    if not whole.all():
+        notes.append(f"mesh: {np.sum(~whole)} degenerate triangles were dropped")
+    rims = _rims(_open_edges(corners, len(positions)))
+    floor, height = positions[:, 1].min(), np.ptp(positions[:, 1])
+    holes = [rim for rim in rims if np.any(positions[rim[:, 0], 1] > floor + _BASE * height)]
+    if holes:
+        wide = max(float(np.ptp(positions[rim[:, 0]], axis=0).max()) for rim in holes)
+        raise InputError(
+            f"mesh: {len(holes)} hole{'s' * (len(holes) > 1)}, {sum(map(len, holes))} open edges, the largest {wide:.1f} mm wide: a walk "
+            "inside needs a closed mesh; close them in your editor, or use --walk flat"
+        )
+    for rim in rims:
+        positions = np.concatenate([positions, positions[rim[:, 0]].mean(axis=0, keepdims=True)])
+        middle = np.full(len(rim), len(positions) - 1)
+        corners = np.concatenate([corners, np.stack([rim[:, 1], rim[:, 0], middle], axis=1)])
+        notes.append(f"mesh: open at the bottom, {len(rim)} edges: closed with a flat cap")
+    volume = np.einsum("ti,ti->", positions[corners[:, 0]], np.cross(*positions[corners[:, 1:]].swapaxes(0, 1))) / 6
+    if volume <= 0:
+        raise InputError("mesh: its triangles face inward; flip its normals in your editor, or use --walk flat")
+    return positions.astype("f4"), corners.astype("i4"), tuple(notes)
+
+
+def _open_edges(corners: np.ndarray, count: int) -> np.ndarray:
+    """Directed edges [E, 2] without one that runs back; InputError where neighbors face opposite ways."""
+    edges = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
+    forth, back = edges @ [count, 1], edges @ [1, count]
+    unmatched = edges[~np.isin(forth, back)]
+    keys, number = np.unique(forth, return_counts=True)
+    returns = dict(zip(*np.unique(back, return_counts=True), strict=True))
+    turned = sum(1 for key, n in zip(keys[number > 1], number[number > 1], strict=True) if n > returns.get(key, 0))
+    if turned:
+        raise InputError(
+            f"mesh: at {turned} edges both triangles face opposite ways; recalculate its normals in your editor, "
+            "or use --walk flat"
+        )
+    return unmatched
+
+
+def _rims(edges: np.ndarray) -> list[np.ndarray]:
+    """Open edges [E, 2] by the hole they surround."""
+    label = {int(v): int(v) for v in edges.ravel()}
+
+    def root(v: int) -> int:
+        while label[v] != v:
+            label[v] = label[label[v]]
+            v = label[v]
+        return v
+
+    for a, b in edges:
+        label[root(int(a))] = root(int(b))
+    of = np.array([root(int(a)) for a in edges[:, 0]], int)
+    return [edges[of == one] for one in np.unique(of)]

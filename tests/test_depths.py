@@ -1,0 +1,118 @@
+"""Depths under a closed mesh, and which meshes are closed."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from lutgen import device as ocl
+from lutgen import head
+from lutgen.errors import InputError
+from lutgen.render import closed, distance
+
+
+def sphere(radius: float, subdivisions: int = 4):
+    made = trimesh.creation.icosphere(subdivisions, radius)
+    return np.asarray(made.vertices), np.asarray(made.faces)
+
+
+def depths_at(points: np.ndarray, positions, triangles, depths: distance.Depths):
+    """Exact depths [N], the grid's [N] and its gradients [N, 3]."""
+    device, N = ocl.choose(), len(points)
+    exact, found = np.empty(N, "f4"), np.empty((N, 4), "f4")
+    buffers = ocl.buffer(device, exact), ocl.buffer(device, found)
+    ocl.launch(
+        device, distance.kernel(device, "depths"), (N,), ocl.buffer(device, points.astype("f4")), *buffers,
+        *distance.buffers(device, depths), *distance.tree_buffers(device, positions, triangles),
+    )  # fmt: skip
+    ocl.read(device, buffers[0], exact)
+    ocl.read(device, buffers[1], found)
+    return exact.astype(float), found[:, 3].astype(float), found[:, :3].astype(float)
+
+
+def test_depths_of_a_sphere_are_its_radius_less_the_distance_to_its_middle():
+    """Exact ones to what a facet cuts off (R (1 - cos) of half an edge), the grid's near the surface to what a cell's
+    curvature adds (h^2 / 4 R), their gradients to h / R."""
+    R, h = 8.0, 0.25
+    positions, triangles = sphere(R)
+    depths = distance.of_mesh(positions, triangles, 0.1, ocl.choose(), h)
+    rng = np.random.default_rng(2)
+    way = rng.normal(size=(4096, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    radius = np.concatenate([rng.uniform(R - 0.6, R + 0.3, 2048), rng.uniform(0, R, 2048)])
+    exact, found, rise = depths_at(way * radius[:, None], positions, triangles, depths)
+    edge = np.linalg.norm(positions[triangles[:, 0]] - positions[triangles[:, 1]], axis=1).max()
+    facet = R * (1 - np.cos(edge / R / 2)) * 1.5
+    assert np.abs(exact - (R - radius)).max() < facet
+    near = np.arange(4096) < 2048
+    assert np.abs(found - exact)[near].max() < h**2 / 4 / R + 2 * facet
+    slope = np.linalg.norm(rise, axis=1)
+    assert np.abs(slope[near] - 1).max() < h / R + edge / R
+    assert np.einsum("ij,ij->i", -rise[near] / slope[near, None], way[near]).min() > 1 - (edge / R) ** 2
+    deep = slope == 0
+    assert deep.any()
+    assert np.all(found[deep] <= exact[deep] + 1e-4)  # a bound never promises more room than there is
+
+
+def test_inside_is_inside_however_the_mesh_is_turned():
+    """A thin box at 20 angles, with points around its edges and corners: no ray is fooled by an edge that it meets."""
+    rng = np.random.default_rng(5)
+    device = ocl.choose()
+    box = trimesh.creation.box((6.0, 3.0, 1.0))
+    for _ in range(20):
+        turn = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
+        positions, triangles = closed.surface(np.asarray(box.vertices) @ turn.T, np.asarray(box.faces))[:2]
+        local = rng.choice([-1.0, 0.0, 1.0], (512, 3)) * (3, 1.5, 0.5) + rng.choice([-1e-2, 1e-2], (512, 3))
+        inside = np.all(np.abs(local) < (3, 1.5, 0.5), axis=1)
+        points = ocl.buffer(device, (local @ turn.T).astype("f4"))
+        exact = np.empty(512, "f4")
+        out = ocl.buffer(device, exact), ocl.buffer(device, 16 * 512)
+        none = distance.Depths(np.zeros(3), 1.0, 1.0, np.zeros((1, 1, 1), "f4"), -np.ones((1, 1, 1), "i4"), np.zeros(1, "i2"))
+        ocl.launch(device, distance.kernel(device, "depths"), (512,), points, *out, *distance.buffers(device, none),
+                   *distance.tree_buffers(device, positions, triangles))  # fmt: skip
+        assert np.array_equal(ocl.read(device, out[0], exact) > 0, inside)
+
+
+def test_depths_are_kept_and_come_back_the_same(monkeypatch, tmp_path):
+    monkeypatch.setenv("LUTGEN_CACHE", str(tmp_path))
+    positions, triangles = sphere(4.0, 2)
+    first = distance.of_mesh(positions, triangles, 0.1, ocl.choose())
+    monkeypatch.setattr(distance, "_make", lambda *given: pytest.fail("made anew"))
+    again = distance.of_mesh(positions, triangles, 0.1, ocl.choose())
+    assert np.array_equal(first.values, again.values)
+    assert np.array_equal(first.middles, again.middles)
+
+
+def test_the_built_in_head_is_closed_at_its_neck():
+    made = head.builtin()
+    positions, triangles, notes = closed.surface(made.positions_mm, made.triangles)
+    assert "closed with a flat cap" in notes[-1]
+    solid = trimesh.Trimesh(positions, triangles, process=False)
+    assert solid.is_watertight
+    assert solid.volume > 0
+
+
+def test_meshes_that_no_walk_can_be_inside_of_are_refused_in_a_line():
+    positions, triangles = sphere(40.0, 3)
+    up = positions[triangles].mean(axis=1)
+    holed = triangles[up[:, 2] < 35]
+    with pytest.raises(InputError, match=r"1 hole, \d+ open edges, the largest \d+\.\d mm wide.*--walk flat"):
+        closed.surface(positions, holed)
+    with pytest.raises(InputError, match="face inward"):
+        closed.surface(positions, triangles[:, ::-1])
+    some = triangles.copy()
+    some[:5] = some[:5, ::-1]
+    with pytest.raises(InputError, match=r"at \d+ edges both triangles face opposite ways"):
+        closed.surface(positions, some)
+    with pytest.raises(InputError, match="degenerate"):
+        closed.surface(positions, triangles[:, [0, 0, 1]])
+    mended = closed.surface(positions, np.concatenate([triangles, triangles[:3, [0, 0, 1]]]))
+    assert len(mended[1]) == len(triangles)
+    assert "3 degenerate triangles" in mended[2][0]
+
+
+def test_seams_are_welded():
+    positions, triangles = sphere(20.0, 2)
+    apart = positions[triangles].reshape(-1, 3)  # every triangle with corners of its own
+    welded = closed.surface(apart, np.arange(len(apart)).reshape(-1, 3))
+    assert len(welded[0]) == len(positions)
+    assert not welded[2]

@@ -1,0 +1,216 @@
+"""Walks over a queue against each other, the path table and adding-doubling; and what every closed surface obeys."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import trimesh
+
+import lutgen
+from lutgen import baking, expansion
+from lutgen import device as ocl
+from lutgen.render import distance, lockstep, queues
+from lutgen.solvers import adding_doubling, path_table
+from lutgen.solvers.path_table import Medium
+from lutgen.tissue import Layer, Skin
+
+N = 2**20
+MU_S, G, INDEX, EPIDERMIS = 22.0, 0.78, 1.4, 0.1
+ABSORBING = (2.0, 0.2)  # epidermis and dermis, 1/mm
+
+
+def medium(nu: float = 0.2) -> Medium:
+    one = [np.array([v]) for v in (550.0, MU_S, G, nu)]
+    return Medium(one[0], one[1], one[2], one[3], EPIDERMIS, INDEX)
+
+
+def entries(count: int, position=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0), cosine: float | np.ndarray = 1.0, seed: int = 0):
+    """Entries [count] under a surface, the direction at that cosine inside and a random azimuth."""
+    made = np.zeros(count, queues.ENTRY)
+    made["position"], made["normal"], made["sample"] = position, normal, np.arange(count)
+    n = made["normal"].astype(float)
+    across = np.cross(n, np.random.default_rng(seed).normal(size=(count, 3)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    cosine = np.broadcast_to(np.asarray(cosine, float), count)[:, None]
+    made["direction"] = across * np.sqrt(1 - cosine**2) - n * cosine
+    return made
+
+
+def walked(given: np.ndarray, through: Medium, depths: distance.Depths | None = None, seed: int = 1, **part):
+    """Exits of entries and the tally."""
+    device, tally = ocl.choose(), lockstep.Tally()
+    K = len(through.wavelength_nm)
+    whole = queues.Part(**({"begin": 0, "end": len(given) // K, "first": 0, "samples": K} | part))
+    buffers = ocl.buffer(device, given), ocl.buffer(device, np.zeros(len(given), queues.EXIT))
+    inside = () if depths is None else tuple(distance.buffers(device, depths))
+    lockstep.walk(through, *buffers, whole, seed, device, tally, inside)
+    return ocl.read(device, buffers[1], np.zeros(len(given), queues.EXIT)), tally
+
+
+def weights(exits: np.ndarray, mu_epidermis=ABSORBING[0], mu_dermis=ABSORBING[1], nu: float = 0.2) -> np.ndarray:
+    """Share of its light that each exit brings, 0 where none left."""
+    le, ld = (exits[name].astype(float) for name in ("path_epidermis_mm", "path_dermis_mm"))
+    return np.where(ld >= 0, np.exp(-(mu_epidermis - nu) * le - (mu_dermis - nu) * ld), 0)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    mean: np.ndarray
+    sigma: np.ndarray
+
+
+def estimate(weight: np.ndarray, where: np.ndarray | None = None, edges: np.ndarray | None = None) -> Estimate:
+    """Mean and standard error of weights, in rings of radius where given."""
+    if edges is None:
+        return Estimate(weight.mean(), weight.std() / np.sqrt(len(weight)))
+    sums, squares = (np.histogram(where, edges, weights=weight**k)[0] / len(weight) for k in (1, 2))
+    return Estimate(sums, np.sqrt(np.maximum(squares - sums**2, 0) / len(weight)))
+
+
+def agree(a: Estimate, b: Estimate) -> bool:
+    return bool(np.all(np.abs(a.mean - b.mean) <= 4 * np.hypot(a.sigma, b.sigma) + 1e-12))
+
+
+def slab(thickness_mm: float, side_mm: float = 60.0, cell_mm: float | None = None) -> distance.Depths:
+    """Depths under a box whose upper face is z = 0."""
+    box = trimesh.creation.box((side_mm, side_mm, thickness_mm))
+    shifted = np.asarray(box.vertices) - (0, 0, thickness_mm / 2)
+    return distance.of_mesh(shifted, np.asarray(box.faces), EPIDERMIS, ocl.choose(), cell_mm)
+
+
+EDGES = np.concatenate([[0], np.geomspace(0.01, 8, 15), [np.inf]])
+
+
+@pytest.fixture(scope="module")
+def under_flat_skin():
+    exits, tally = walked(entries(N), medium())
+    return exits, tally
+
+
+def radius(exits: np.ndarray) -> np.ndarray:
+    return np.hypot(exits["position"][:, 0], exits["position"][:, 1]).astype(float)
+
+
+def test_the_flat_walk_is_the_path_table(under_flat_skin):
+    """Albedo and energy in every ring, both estimates' sigma counted; and the albedo is the exact one."""
+    exits, tally = under_flat_skin
+    assert tally.entered == N
+    assert tally.unfinished == tally.lost == 0
+    assert np.all(exits["position"][:, 2] == 0)
+    stack = [Layer(EPIDERMIS, ABSORBING[0], MU_S, G, INDEX), Layer(np.inf, ABSORBING[1], MU_S, G, INDEX)]
+    sums, squares, _ = path_table.ring_sums(stack, EDGES, N, 3)
+    table = Estimate(sums / N, np.sqrt((squares / N - (sums / N) ** 2) / N))
+    w = weights(exits)
+    assert agree(estimate(w, radius(exits), EDGES), table)
+    exact = lutgen.reflectance(stack).diffuse / medium().entry
+    assert agree(estimate(w), Estimate(np.array(exact), np.array(0.0)))
+
+
+def test_a_thick_slab_by_the_walk_inside_is_flat_skin(under_flat_skin):
+    """Albedo, energy in every ring, mean paths in both layers and mean cosine of the exits."""
+    flat, (found, tally) = under_flat_skin[0], walked(entries(N), medium(), slab(30.0, 80.0, 0.5))
+    assert tally.lost == tally.unfinished == 0
+    one, other = weights(found), weights(flat)
+    assert agree(estimate(one), estimate(other))
+    assert agree(estimate(one, radius(found), EDGES), estimate(other, radius(flat), EDGES))
+    for value in (lambda e: e["path_epidermis_mm"], lambda e: e["path_dermis_mm"], lambda e: e["direction"][:, 2]):
+        assert agree(estimate(one * value(found)), estimate(other * value(flat)))
+    left = found["path_dermis_mm"] >= 0
+    assert np.abs(found["position"][left, 2]).max() < 1e-3
+    assert np.abs(np.linalg.norm(found["direction"][left], axis=1) - 1).max() < 1e-5
+    assert found["direction"][left, 2].min() > 0
+
+
+@pytest.mark.parametrize("thickness_mm", [1.0, 3.0])
+def test_slabs_with_an_epidermis_on_both_faces_are_three_layers_of_adding_doubling(thickness_mm):
+    """What leaves above and below, against the exact solution of epidermis, dermis, epidermis; nothing at the sides."""
+    skin = Layer(EPIDERMIS, ABSORBING[0], MU_S, G, INDEX)
+    inner = Layer(thickness_mm - 2 * EPIDERMIS, ABSORBING[1], MU_S, G, INDEX)
+    exact = lutgen.reflectance([skin, inner, skin])
+    exits, tally = walked(entries(N), medium(), slab(thickness_mm))
+    assert tally.lost == tally.unfinished == 0
+    w, up = weights(exits) * medium().entry, exits["normal"][:, 2]
+    assert agree(estimate(w * (up > 0.5)), Estimate(np.array(exact.diffuse), np.array(0.0)))
+    assert agree(estimate(w * (up < -0.5)), Estimate(np.array(exact.transmitted), np.array(0.0)))
+    assert np.all(w[np.abs(up) < 0.5] < 1e-6)
+
+
+def test_a_lossless_sphere_loses_nothing_and_its_mean_path_is_that_of_its_volume():
+    """Under even light from all sides the mean path is 4 n^2 V / (S T), whatever scatters inside (Blanco & Fournier
+    2003; T: hemispherical transmission into the sphere): surface, epidermis and refraction all err in it."""
+    R, count = 2.5, 2**18
+    made = trimesh.creation.icosphere(5, R)
+    depths = distance.of_mesh(np.asarray(made.vertices), np.asarray(made.faces), EPIDERMIS, ocl.choose(), 0.25)
+    rng = np.random.default_rng(4)
+    way = rng.normal(size=(count, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    cosines = np.sqrt((np.arange(4096) + 0.5) / 4096)
+    passed = 1 - adding_doubling.fresnel(cosines, 1.0, INDEX)
+    outside = rng.choice(cosines, count, p=passed / passed.sum())
+    inside = np.sqrt(1 - (1 - outside**2) / INDEX**2)
+    exits, tally = walked(entries(count, way * R, way, inside), medium(1e-7), depths)
+    assert tally.lost == 0
+    assert 1 - tally.escaped / tally.entered < 1e-4
+    path = exits["path_epidermis_mm"].astype(float) + exits["path_dermis_mm"]
+    exact = 4 * INDEX**2 * made.volume / (made.area * passed.mean())
+    assert abs(path.mean() - exact) < 4 * path.std() / np.sqrt(count) + 0.003 * exact  # .3 %: see kernels/anchors.cl
+
+
+def test_light_that_comes_in_at_60_degrees_leaves_as_adding_doubling_says():
+    """The ratio to normal incidence on dark skin (PHYSICS: .91 to 1.28) at the quadrature's node nearest 60 degrees."""
+    layers = lutgen.layers(lutgen.preset("dark"), 450.0)
+    base, _ = adding_doubling.directions([1.0, INDEX])
+    air = np.sqrt(np.maximum(1 - INDEX**2 * (1 - base**2), 0))
+    node = int(np.argmin(np.abs(air - 0.5)))
+    exact = adding_doubling.stack(layers, incident=node)[0]
+    top, bottom = layers
+    one = [np.array([v]) for v in (450.0, top.mu_s_per_mm, top.g, bottom.mu_a_per_mm)]
+    exits, _ = walked(entries(N, cosine=base[node]), Medium(one[0], one[1], one[2], one[3], top.thickness_mm, INDEX))
+    entry = 1 - adding_doubling.fresnel(air[node : node + 1], 1.0, INDEX)[0]
+    w = entry * weights(exits, top.mu_a_per_mm, bottom.mu_a_per_mm, bottom.mu_a_per_mm)
+    assert agree(estimate(w), Estimate(np.array(exact), np.array(0.0)))
+    assert exact / lutgen.reflectance(layers).diffuse > 1.1
+
+
+def test_all_wavelengths_of_a_queue_give_the_sets_color():
+    """Samples stratified over the set's wavelengths: the color at a node of its grid, the set's own sigma counted."""
+    luts = lutgen.load()
+    axes = luts.color_lut.grid
+    skin = [axis.values[axis.count // 3] for axis in (axes.melanin, axes.eumelanin, axes.hemoglobin)]
+    nm, weight = luts.paths.wavelength_nm, luts.weights
+    through, _ = baking.skin_medium(Skin(*skin), nm)
+    K = len(nm)
+    exits, _ = walked(entries(2**16 * K), through)
+    mu = expansion.coefficients(nm, luts.absorbers, *(np.array([v]) for v in skin))
+    w = weights(exits.reshape(-1, K), mu[0][:, 0], mu[1][:, 0], through.nu_per_mm) * through.entry
+    found = Estimate(w.mean(axis=0) @ weight, np.sqrt((w.std(axis=0) ** 2 / len(w)) @ weight**2))
+    wanted = luts.color(*skin, space="acescg")
+    assert agree(found, Estimate(wanted, luts.color_std_error(*skin)))
+
+
+def test_exits_do_not_depend_on_how_a_picture_was_cut():
+    """Blocks of pixels, estimates and turns have streams of their own; empty places have no exit."""
+    device = ocl.choose()
+    size, K = lockstep.block(device), 2
+    two = Medium(*(np.array([v, v]) for v in (550.0, MU_S, G, 0.1)), EPIDERMIS, INDEX)
+    two.wavelength_nm[1] = 600.0
+    given = entries(3 * size * 2 * K)
+    given["sample"][::7] = queues.EMPTY
+    whole, tally = walked(given, two, begin=0, end=3 * size, samples=2 * K)
+    assert tally.entered == np.sum(given["sample"] != queues.EMPTY)
+    assert np.all(whole["path_dermis_mm"][::7] < 0)
+    by_pixel = given.reshape(3 * size, 2, K)
+    cut = [walked(by_pixel[:size].ravel(), two, begin=0, end=size, samples=2 * K)[0]]
+    halves = [
+        walked(np.ascontiguousarray(by_pixel[size:, k]).ravel(), two, begin=size, end=3 * size, first=k * K, samples=K)[0]
+        for k in (0, 1)
+    ]
+    joined = np.stack([half.reshape(2 * size, K) for half in halves], axis=1)
+    assert np.concatenate([*cut, joined.ravel()]).tobytes() == whole.tobytes()
+    paths = [whole["path_dermis_mm"], walked(given, two, begin=0, end=3 * size, samples=2 * K, turn=1)[0]["path_dermis_mm"]]
+    paths += [walked(given, two, begin=0, end=3 * size, samples=2 * K, seed=2)[0]["path_dermis_mm"]]
+    paths += [whole.reshape(-1, 2, K)[:, ::-1].ravel()["path_dermis_mm"], whole.reshape(-1, K)[:, ::-1].ravel()["path_dermis_mm"]]
+    for other in paths[1:]:  # another turn, seed, estimate and wavelength
+        both = (paths[0] >= 0) & (other >= 0)
+        assert both.sum() > 1000
+        assert np.mean(paths[0][both] == other[both]) < 0.01
