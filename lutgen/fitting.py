@@ -25,7 +25,7 @@ SPECULAR = ((REFRACTIVE_INDEX - 1) / (REFRACTIVE_INDEX + 1)) ** 2
 SKIN, NO_SKIN = 2.0, 10.0
 """Difference from the nearest skin up to which a measurement is one's, and from which it is refused (CIEDE2000, and
 root mean square lightness of a spectrum): the Monk scale's ten tones lie up to 9.3 away, black 10.5, white 14."""
-TRADE_OFF, UNSURE = 0.95, 0.3
+TRADE_OFF, UNSURE = 0.9, 0.3
 """Correlation from which two parameters trade off; sigma (relative for melanin and hemoglobin) that says little."""
 SEEN_NM = (420.0, 680.0)
 """A spectrum that covers less is no fair picture of a color: beyond lie 1.2, 0.2 and 3.2 % of X, Y and Z."""
@@ -178,16 +178,20 @@ def _as_read_otherwise(task: Problem, left: float) -> str:
 
 def _cautions(values: dict[str, float], sigma: dict[str, float | None], correlation: np.ndarray) -> list[str]:
     """Parameters at bounds, hardly determined, or trading off."""
-    said = []
-    for name, spread in sigma.items():
+    said, names = [], list(values)
+    apart = np.abs(correlation - np.diag(np.diag(correlation)))
+    for name, against in zip(names, apart, strict=True):
+        spread, partner = sigma[name], int(against.argmax())
         if spread is None:
             end = min(PARAMETERS[name], key=lambda end: abs(values[name] - end))
             said.append(f"{name} is at its bound {end:g}: it has no sigma, and the others' hold it there")
         elif spread > UNSURE * (values[name] if name in CUBE_ROOT else 1):
-            said.append(f"{name} is hardly determined by these data (sigma {spread:.2g})")
-    for (i, one), (j, two) in combinations(enumerate(values), 2):
-        if abs(correlation[i, j]) > TRADE_OFF:
-            said.append(f"{one} and {two} trade off (correlation {correlation[i, j]:.2f}): fix one")
+            most = f", mostly against {names[partner]}" if 0.5 < against[partner] <= TRADE_OFF else ""
+            said.append(f"{name} is hardly determined by these data (sigma {spread:.2g}{most})")
+    for i, j in combinations(range(len(names)), 2):
+        if apart[i, j] > TRADE_OFF:
+            how = f"correlation {correlation[i, j]:.2f}"
+            said.append(f"{names[i]} and {names[j]} trade off ({how}): these data hardly tell them apart")
     return said
 
 

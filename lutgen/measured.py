@@ -172,7 +172,11 @@ def _from_csv(path: Path) -> Measured:
     if not kept:
         raise InputError(f"{path}: empty; a CSV with columns {', '.join(COLUMNS)} is needed")
     part = next((mark for mark in "\t;" if mark in kept[0][1]), ",")
-    header, *rows = csv.reader(io.StringIO("\n".join(line for _, line in kept)), delimiter=part, skipinitialspace=True)
+    try:
+        lines = io.StringIO("\n".join(line for _, line in kept))
+        header, *rows = csv.reader(lines, delimiter=part, skipinitialspace=True)
+    except csv.Error as error:
+        raise InputError(f"{path}: no CSV ({error}); columns {', '.join(COLUMNS)} are needed") from None
     names = [name.strip().lower() for name in header]
     for column in COLUMNS:
         if names.count(column) != 1:
@@ -185,7 +189,7 @@ def _from_csv(path: Path) -> Measured:
             values.append([float(row[place]) for place in places])
         except (ValueError, IndexError):
             raise InputError(
-                f"{path}, line {line}: {shown(part.join(row))} holds no numbers for both columns"
+                f"{path}, line {line}: {shown(part.join(row))} lacks a number (with a decimal point) in a column"
             ) from None
     extra = [name for name in names if name and name not in COLUMNS]
     notes = (f"columns not read: {', '.join(extra)}",) if extra else ()

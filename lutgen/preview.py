@@ -260,7 +260,7 @@ def draw_fit(skin: Skin, result: dict) -> Image.Image:
 
 
 def _reflectance_chart(sheet: Sheet, nm: np.ndarray, highest: float, label: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Frame of a chart of reflectance; what it returns gives the points [n, 2] of reflectance [n] at these wavelengths."""
+    """Frame of a chart; what it returns gives the points [n, 2] of reflectance [n] at these wavelengths."""
     left, top, right, bottom = _CHART
     highest = max(highest, 1e-4)
     step = next(s for s in (m * 10.0**d for d in range(-5, 1) for m in (1, 2, 5)) if highest <= 5 * s)

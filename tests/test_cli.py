@@ -172,6 +172,18 @@ BAD = [
     (["swatch", "--preset", ""], "preset = '': allowed is very-light"),
     (["swatch", "--preset", "light", "--saidi-a-per-mm", "9"], "add --scattering saidi"),
     (["swatch", "--preset", "light", "--method", "direct", "--photons", "0"], "photons = 0: allowed"),
+    (["fit"], "quote #, with which shells begin a comment"),
+    (["fit", "absent.csv"], "'absent.csv': cannot be read (No such file"),
+    (["fit", "lab:62,10"], "three numbers with commas are needed"),
+    (["fit", "#c0958"], "six hexadecimal digits are needed"),
+    (["fit", "srgb:198,136,99"], "r = 198: allowed is 0 to 1; divide by 255"),
+    (["fit", "#808080"], "measured color #808080: no skin has it; the nearest of the model, #"),
+    (["fit", "lab:62,10,18", "--parameters", "iron"], "parameters = 'iron': allowed is melanin, hemoglobin"),
+    (["fit", "lab:62,10,18", "--parameters", "melanin"], "hemoglobin: neither fitted nor fixed"),
+    (["fit", "lab:62,10,18", "--parameters", "melanin,hemoglobin", "--melanin", "0.1"], "both fitted and fixed"),
+    (["fit", "lab:62,10,18", "--noise", "nan"], "noise = nan: allowed is 0.001 to 20"),
+    (["fit", "lab:62,10,18", "--saidi-a-per-mm", "9"], "add --scattering saidi"),
+    (["fit", "lab:62,10,18", "--png", "/proc/x.png"], "png = /proc/x.png: cannot be written"),
     (["bake", "--out", ""], "out = '': the name of a folder is needed"),
     (["bake", "--out", "x" * 300], "the name is too long"),
     (["info", "a\nb"], "a b: no LUT set there"),
@@ -198,6 +210,45 @@ def test_existing_folder_is_refused_before_any_work(capsys, tmp_path, monkeypatc
     assert status == 2
     assert "exists" in err
     assert not list(tmp_path.iterdir())
+
+
+def test_fit_prints_its_figures_and_json(capsys, tmp_path):
+    skin = lutgen.Skin(0.03, 0.7, 0.01, oxygenation=0.6)
+    nm = np.arange(400, 701, 10)
+    data = tmp_path / "skin.csv"
+    rows = [f"{w},{v + 1 / 36:.6f}" for w, v in zip(nm, lutgen.spectrum(skin, nm), strict=True)]
+    data.write_text("wavelength_nm,reflectance\n" + "\n".join(rows))
+    status, text, err = run(capsys, "fit", data, "--specular-included", "--png", tmp_path / "fit.png")
+    assert (status, err) == (0, "")
+    lines = text.splitlines()
+    assert [line.split()[0] for line in lines[:3]] == ["melanin", "hemoglobin", "oxygenation"]
+    assert "over 31 wavelengths, 400 to 700 nm; measured #" in text
+    with Image.open(tmp_path / "fit.png") as picture:
+        assert picture.size == (800, 400)
+    status, text, _ = run(capsys, "fit", data, "--specular-included", "--json")
+    result = json.loads(text)
+    assert result["parameters"] == pytest.approx({"melanin": 0.03, "hemoglobin": 0.01, "oxygenation": 0.6}, rel=0.01)
+    assert result["skin"]["melanin"] == result["parameters"]["melanin"]
+    assert set(result["sigma"]) == set(result["correlation"]) == set(result["parameters"])
+    assert result["delta_e00"] < 0.01
+    assert result["rmse"] < 1e-5
+    status, text, _ = run(capsys, "fit", data, "--specular-included", "--json", "--oxygenation", 0.6)
+    assert set(json.loads(text)["parameters"]) == {"melanin", "hemoglobin"}
+    assert json.loads(text)["skin"]["oxygenation"] == 0.6
+    status, text, _ = run(capsys, "fit", "lab:62,10,18", "--json", "--parameters", "hemoglobin", "--melanin", 0.02)
+    assert set(json.loads(text)["parameters"]) == {"hemoglobin"}
+    assert json.loads(text)["rmse"] is None
+
+
+def test_fit_says_what_it_left_out_and_draws_a_color(capsys, tmp_path):
+    status, text, _ = run(capsys, "fit", "#b89985", "--png", tmp_path / "color.png")
+    assert status == 0
+    assert "±: at a noise of ΔE00 1 in the color" in text
+    assert (tmp_path / "color.png").stat().st_size > 3000
+    status, text, _ = run(capsys, "fit", "linear:0.71,0.58,0.48")
+    assert "note: no skin of the model has this color" in text
+    assert "; read as srgb: " in text
+    assert "at its bound" in text
 
 
 def test_no_opencl_is_one_line_status_1(capsys, tmp_path, monkeypatch):

@@ -112,3 +112,14 @@ def test_bad_color_input_is_named():
     ):
         with pytest.raises(lutgen.InputError, match=message.replace("(", r"\(")):
             call()
+
+
+def test_the_metric_is_the_difference_of_near_colors_and_lab_goes_back():
+    rng = np.random.default_rng(4)
+    for lab in rng.uniform([1, -60, -60], [100, 60, 60], (30, 3)):
+        for step in rng.normal(0, 0.005, (5, 3)):
+            length = np.linalg.norm(color.metric(lab) @ step)
+            assert length == pytest.approx(float(color.delta_e00(lab, lab + step)), rel=0.01)
+    xyz = rng.random((4, 5, 3)) ** 4
+    assert np.abs(color.from_lab(color.lab(xyz)) - xyz).max() < 1e-12
+    assert np.abs(color.encode_srgb(color.decode_srgb(xyz)) - xyz).max() < 1e-9

@@ -118,6 +118,15 @@ def test_swatch_and_bake_do_not_import_colour(tmp_path):
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "set")], check=True, capture_output=True)
 
 
+def test_a_fit_needs_numpy_only():
+    code = (
+        "import sys; from lutgen.cli import main; main(['fit', '#b89985', '--json']);"
+        "bad = {'colour', 'scipy', 'matplotlib', 'pyopencl', 'PIL', 'OpenEXR'} & set(sys.modules);"
+        "sys.exit(str(bad) if bad else 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
 def test_modules_stay_short():
     for path in [*(ROOT / "lutgen").rglob("*.py"), *(ROOT / "viewer").glob("*.py")]:
         assert len(path.read_text().splitlines()) <= 300, path.name

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from lutgen import color
 from lutgen.commands import Outcome
-from lutgen.errors import InputError, cannot_write
+from lutgen.errors import InputError, cannot_write, one_of
 from lutgen.measured import GRAMMAR
 
 if TYPE_CHECKING:
@@ -93,6 +93,8 @@ def fit(options: Namespace) -> Outcome:
     else:
         default = fitting.OF_COLOR if data.wavelength_nm is None else fitting.OF_SPECTRUM
         wanted = tuple(name for name in default if name not in given)
+    for name in wanted:
+        one_of("parameters", name, tuple(fitting.PARAMETERS))
     both = [name for name in wanted if name in given]
     if both:
         raise InputError(f"{both[0]}: both fitted and fixed; drop --{both[0]}, or take it out of --parameters")
