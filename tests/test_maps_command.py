@@ -200,8 +200,8 @@ def test_an_albedo_on_its_own_skin_stays_as_it_is(capsys, tmp_path, painted):
 @pytest.mark.parametrize("preset", ["dark", "source-african"])
 def test_dark_skin_shows_neither_cells_nor_blotches(capsys, tmp_path, luts, preset):
     """Light skin with grain, as a camera has it, moved to dark skin: its luminance varies over its mean no more than
-    it did, coarse and fine; and its slopes repeat at the cells of the low frequencies (32 a side) no more than nearby: what
-    is over 3.2 times the root mean square there happens once in 500 such places by chance, and the seed is fixed."""
+    it did, coarse and fine; and its slopes repeat at the cells of the low frequencies (32 a side) no more than nearby:
+    over 3.2 times the root mean square there happens once in 500 such places by chance, and the seed is fixed."""
     side = 256
     across = np.linspace(0, 1, side)
     m = np.broadcast_to(0.015 * 2**across, (side, side))
