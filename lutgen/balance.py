@@ -73,22 +73,23 @@ def _basis(free: str) -> np.ndarray:
 
 def _gain(surface: Surface, some: np.ndarray, free: str) -> tuple[np.ndarray, float, np.ndarray]:
     """Gain [3], its cost and positions [2, N], by least squares on the distances, reweighted to their mean size."""
-    basis, at = _basis(free), None
+    basis = _basis(free)
     amount, best, costs = np.zeros(basis.shape[1]), np.ones(3), []
-    while len(costs) < _STEPS:
-        gain = np.exp(basis @ amount)
-        off, slopes, at = _off_surface(surface, some, gain, at)
+    off, slopes, at = _off_surface(surface, some, best, None)
+    while True:
         size = np.linalg.norm(off, axis=0)
         costs.append(float(size.mean() + 0.5 * amount @ amount))
         if costs[-1] == min(costs):
-            best = gain
-        if not len(amount) or (len(costs) > 2 and costs[-1] > costs[-3] - _SETTLED):
+            best = np.exp(basis @ amount)
+        settled = len(costs) > 2 and costs[-1] > costs[-3] - _SETTLED
+        if not len(amount) or settled or len(costs) == _STEPS:
             break
         along = np.einsum("lnc,ck->lnk", slopes, basis)
         weight = 1 / np.maximum(size, _NEAR) / len(size)
         matrix = np.einsum("lni,lnj,n->ij", along, along, weight) + np.eye(len(amount))
         step = np.linalg.solve(matrix, -np.einsum("lni,ln,n->i", along, off, weight) - amount)
         amount = amount + step * min(1.0, _FAR / max(np.abs(basis @ step).max(), 1e-9))
+        off, slopes, at = _off_surface(surface, some, np.exp(basis @ amount), at)
     return (best, min(costs), at) if min(costs) < costs[0] - WORTH else (np.ones(3), costs[0], at)
 
 
@@ -98,14 +99,15 @@ def _off_surface(surface: Surface, some: np.ndarray, gain: np.ndarray, at: np.nd
     xyz = gamut.relative(colors)
     root, rate = gamut.roots(xyz)
     wanted = gamut.opponent(root)
-    weights = gamut.metric(wanted)
     if at is None:
         at = gamut.refined(surface, wanted, surface.start(wanted))
     else:
         at = gamut.refined(surface, wanted, at, reach=gamut.NEAR)
     skin, *along = surface.read(at)
-    off = gamut.seen(weights, wanted - gamut.opponent(gamut.roots(skin)[0]))
-    rate_there = gamut.roots(skin)[1]
+    root_there, rate_there = gamut.roots(skin)
+    shown = gamut.opponent(root_there)
+    weights = gamut.metric((wanted + shown) / 2)
+    off = gamut.seen(weights, wanted - shown)
     tangents = [gamut.seen(weights, gamut.opponent(rate_there * slope)) for slope in along]
     slopes = np.stack([
         gamut.seen(weights, gamut.opponent(rate * gamut.relative(colors * np.eye(3, dtype="f4")[c]))) for c in range(3)

@@ -1,9 +1,9 @@
 """The colors of skin at one eumelanin ratio as a surface over melanin and hemoglobin, and its point nearest a color.
 
 *Computation*: the color LUT at that eumelanin is bilinear within a cell, in XYZ relative to white. *Metric*: CIELAB
-whose lightness, chroma and hue are divided as CIEDE2000 does at the wanted color, so that what is nearest is nearest
-to the eye. *Lookup*: a coarse table over CIELAB says where to start, then damped Gauss-Newton steps; the derivatives
-are exact within a cell. Single precision, channels first, chunks on every core: NumPy lets go of its lock.
+whose lightness, chroma and hue are divided as CIEDE2000 does halfway to the wanted color, so that what is nearest is
+nearest to the eye. *Lookup*: a coarse table over CIELAB says where to start, then damped Gauss-Newton steps; the
+derivatives are exact within a cell. Single precision, channels first, chunks on every core: NumPy lets go of its lock.
 """
 
 from __future__ import annotations
@@ -126,6 +126,10 @@ class Surface:
         along_m = m_slope + h * twist
         return corner + m * along_m + h * h_slope, along_m, h_slope + m * twist
 
+    def coded(self, at: np.ndarray) -> np.ndarray:
+        """L* + 16, a*, b* [3, N] at positions [2, N]."""
+        return opponent(roots(self.read(at)[0])[0])
+
     def values(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Melanin and hemoglobin at positions [2, ...]."""
         return self.melanin.value(at[0]), self.hemoglobin.value(at[1])
@@ -135,7 +139,7 @@ class Surface:
         """Lowest corner [3] and cells per unit [3] of a table over CIELAB, and each cell's nearest skin [2, ..]."""
         grid = np.meshgrid(*(np.linspace(0, n, _STARTS, dtype="f4") for n in self.most), indexing="ij")
         at = np.stack([g.ravel() for g in grid])
-        known = opponent(roots(self.read(at)[0])[0])
+        known = self.coded(at)
         low, high = known.min(axis=1) - np.float32(_MARGIN), known.max(axis=1) + np.float32(_MARGIN)
         cell = (np.indices((_ACROSS,) * 3, "f4").reshape(3, -1) + np.float32(0.5)) / np.float32(_ACROSS)
         centers = low[:, None] + cell * (high - low)[:, None]
@@ -183,7 +187,7 @@ def refined(
     surface: Surface, wanted: np.ndarray, at: np.ndarray, hold: np.ndarray | None = None, reach=_REACH
 ) -> np.ndarray:
     """Damped Gauss-Newton steps from positions [2, N] until none moves; what has settled is left alone."""
-    weights = metric(wanted)
+    weights = metric((wanted + surface.coded(at)) / 2)
     pull = [np.float32((_HOLD / max(n, 1)) ** 2 if hold is not None else 0) for n in surface.most]
     hold = at if hold is None else hold
     out, moving = at, None

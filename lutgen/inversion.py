@@ -55,8 +55,8 @@ def invert(
 ) -> Inversion:
     """Melanin and hemoglobin of an albedo [R, C, 3] in linear sRGB.
 
-    What is not `painted` [R, C], or black, is background. Without `eumelanin` or `gain` [3] they are fitted. Raises InputError for another shape, NaN, negative values, or an
-    albedo that is black throughout.
+    What is not `painted` [R, C], or black, is background. Without `eumelanin` or `gain` [3] they are fitted. Raises
+    InputError for another shape, NaN, negative values, or an albedo that is black throughout.
 
     >>> import lutgen
     >>> luts = lutgen.load()
@@ -148,7 +148,7 @@ def _left(surface: Surface, wanted: np.ndarray, at: np.ndarray) -> np.ndarray:
     left, offset = np.empty(wanted.shape[1], "f4"), np.array([16, 0, 0], "f4")
 
     def _compare(part: slice) -> None:
-        shown = gamut.opponent(gamut.roots(surface.read(at[:, part])[0])[0])
+        shown = surface.coded(at[:, part])
         left[part] = color.delta_e00(shown.T - offset, wanted[:, part].T - offset)
 
     gamut.in_chunks(_compare, len(left))

@@ -9,7 +9,7 @@ Row 0 of every array here is the bottom of the picture, where v is 0.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +82,8 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
     """The maps that a folder holds, by name (`melanin.png`, `thickness.exr` ...); InputError where there is none.
 
     Each replaces that one map of `under`, the others stay: an occlusion map leaves the thickness that was there. An
-    albedo takes the place of the chromophores under it, for lips and freckles are painted into it already.
+    albedo takes the place of the chromophores under it, for lips and freckles are painted into it already; maps that
+    `lutgen maps` made take the place of the albedo under them, which they were made of.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -99,13 +100,15 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
     for name in values.keys() - {"normal", "albedo"}:
         if values[name].min() < 0:
             raise InputError(f"map {found[name]}: holds negative values, down to {values[name].min():g}; mend it")
-    below = under or Maps()
+    below, melanin = under or Maps(), _melanin_of(folder)
+    if melanin is not None:
+        below = replace(below, albedo=None, full_contrast_melanin=melanin)
     return Maps(
         _together(values, RATIOS, None if "albedo" in values else below.chromophores),
         _together(values, SURFACE, below.surface),
         _color(values["normal"]) if "normal" in values else below.normal,
         _color(values["albedo"]) if "albedo" in values else below.albedo,
-        _melanin_of(folder) or below.full_contrast_melanin,
+        below.full_contrast_melanin,
     )  # fmt: skip
 
 

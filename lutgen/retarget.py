@@ -1,8 +1,7 @@
 """An albedo moved to another skin: its pigment and blood moved in the LUT, what they do not explain laid on top.
 
-A mole or a blush is a ratio of melanin or hemoglobin to the skin around it. The same ratio shows more on a skin whose
-color follows that chromophore more steeply, and so do noise and baked light: dark skin would blotch. There they are
-moved by what shows as much as they did.
+A mole is a ratio of melanin to the skin around it. The same ratio shows far more on dark skin, whose color follows
+melanin more steeply, and so do noise and baked light: it would blotch. Detail is therefore moved to what shows as much.
 """
 
 from __future__ import annotations
@@ -24,11 +23,13 @@ _SRGB_FROM_ACESCG = (color.SRGB_FROM_XYZ @ np.linalg.inv(color.ACESCG_FROM_XYZ))
 
 def moves(
     luts: LutSet, base: tuple[float, float, float], target: tuple[float, float, float]
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For melanin and for hemoglobin: values around `base` [N], rising, and what becomes of each around `target` [N].
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """For melanin and for hemoglobin: values around `base` [N], rising, what becomes of each around `target` [N], and
+    what its light is multiplied with [N].
 
-    A value's ratio to the base is kept where the luminance that it makes, over its skin's, differs on the target no
-    more than on the base; else the value is the one that makes the same.
+    Melanin becomes what makes the same luminance over its skin's as it did on the base. So does hemoglobin, unless the
+    same ratio shows less: a flush fades on dark skin. Where the LUT ends before that, light goes on as it does on the
+    base: brows on the darkest skin are darker than skin can be.
     """
     grid, found = luts.color_lut.grid, []
     for k, axis in ((0, grid.melanin), (2, grid.hemoglobin)):
@@ -41,8 +42,12 @@ def moves(
             shown.append(luminance[:-1] - luminance[-1])
         same = np.interp(-shown[0], -shown[1], values)  # the more there is of either, the darker
         ratio = np.clip(values * (target[k] / base[k]), axis.low, axis.high)
-        nearer = np.abs(same - target[k]) < np.abs(ratio - target[k])
-        found.append((values, np.where(nearer, same, ratio)))
+        fades = axis is grid.hemoglobin and np.abs(ratio - target[k]) < np.abs(same - target[k])
+        goal = np.where(fades, ratio, same)
+        inside = np.flatnonzero((goal > axis.low) & (goal < axis.high))
+        first, end = (int(inside[0]), int(inside[-1])) if len(inside) else (0, _NODES - 1)
+        last = np.clip(np.arange(_NODES), first, end)
+        found.append((values, goal, np.exp(shown[0] - shown[0][last])))
     return found
 
 
@@ -60,11 +65,12 @@ def recolored(luts: LutSet, found: Inversion, albedo: np.ndarray, target: tuple[
     moved = np.empty_like(painted, "f4")
 
     def _move(part: slice) -> None:
-        goal = np.stack([np.interp(v, *curve) for v, curve in zip(skins[:, part], curves, strict=True)])
+        goal = np.stack([np.interp(v, of, to) for v, (of, to, _) in zip(skins[:, part], curves, strict=True)])
+        light = [np.interp(v, of, rest).astype("f4") for v, (of, _, rest) in zip(skins[:, part], curves, strict=True)]
         was, now = _acescg(before, skins[:, part]), _acescg(after, goal)
         given = _ACESCG @ gamut.relative(painted[part] * gain)
         factor = np.clip(given / np.maximum(was, np.float32(1e-5)), *np.array(_FACTOR, "f4"))
-        moved[part] = np.maximum(_SRGB_FROM_ACESCG @ (now * factor), 0).T
+        moved[part] = np.maximum(_SRGB_FROM_ACESCG @ (now * factor * light[0] * light[1]), 0).T
 
     gamut.in_chunks(_move, len(painted))
     out[inside] = moved
