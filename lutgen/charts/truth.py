@@ -20,7 +20,7 @@ from lutgen.scene import Look
 
 VIEWS = {
     "portrait": Look(),
-    "close-up": Look(distance_mm=170.0, target_mm=(14.0, -22.0, 95.0)),
+    "close-up": Look(distance_mm=60.0, target_mm=(20.0, -30.0, 88.0)),
 }
 """The default look at 1.3 mm per pixel of a picture of 192 x 192, and a nose's shadow at 0.36."""
 _MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.36}
