@@ -60,7 +60,7 @@ __kernel void flat_walk(__global const job_t *jobs, __global const entry_t *entr
                         running--;
                         if (left >> i & 1u) {
                             const float3 normal = vload3(0, entries[slot].normal);
-                            tangents(normal, &t, &b);
+                            across(normal, &t, &b);
                             put_exit(exits + slot, vload3(0, entries[slot].position) + radius_x[i] * t + radius_y[i] * b,
                                      refracted_out(to_x[i] * t + to_y[i] * b, normal, n), normal, path[i], path_e[i]);
                             escaped++;
@@ -71,7 +71,7 @@ __kernel void flat_walk(__global const job_t *jobs, __global const entry_t *entr
                     slots[i] = slot = next_entry(&job, entries, exits, &taken);
                     if (slot != EMPTY) {
                         const float3 normal = vload3(0, entries[slot].normal), d = vload3(0, entries[slot].direction);
-                        tangents(normal, &t, &b);
+                        across(normal, &t, &b);
                         to_x[i] = dot(d, t);
                         to_y[i] = dot(d, b);
                         to_z[i] = fmax(-dot(d, normal), 1e-4f);

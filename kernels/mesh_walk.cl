@@ -12,7 +12,7 @@ inline bool enter(float (*lanes)[W], float (*anchors)[W], uint i, __global const
     if (dot(normal, normal) == 0.0f) return false;
     const float out = fmax(dot(d, normal), 0.0f);  // where the picture's normal is not the grid's
     d -= 2.0f * out * normal;
-    tangents(normal, &t, &b);
+    across(normal, &t, &b);
     put_lane3(anchors, AT, i, p);
     put_lane3(anchors, T, i, t);
     put_lane3(anchors, B, i, b);

@@ -33,13 +33,6 @@ inline float3 refracted_out(float3 along, float3 normal, float n) {
     return normalize(out + normal * sqrt(fmax(1.0f - dot(out, out), 0.0f)));
 }
 
-// Two unit vectors along a surface (Duff et al. 2017).
-inline void tangents(float3 n, float3 *t, float3 *b) {
-    const float s = copysign(1.0f, n.z), a = -1.0f / (s + n.z), c = n.x * n.y * a;
-    *t = (float3)(1.0f + s * n.x * n.x * a, s * c, -s * n.x);
-    *b = (float3)(c, s + n.y * n.y * a, -n.y);
-}
-
 inline void put_exit(__global exit_t *out, float3 position, float3 direction, float3 normal, float path, float path_e) {
     vstore3(position, 0, out->position);
     vstore3(direction, 0, out->direction);

@@ -66,7 +66,8 @@ def test_inside_is_inside_however_the_mesh_is_turned():
         points = ocl.buffer(device, (local @ turn.T).astype("f4"))
         exact = np.empty(512, "f4")
         out = ocl.buffer(device, exact), ocl.buffer(device, 16 * 512)
-        none = distance.Depths(np.zeros(3), 1.0, 1.0, np.zeros((1, 1, 1), "f4"), -np.ones((1, 1, 1), "i4"), np.zeros(1, "i2"))
+        one = np.zeros((1, 1, 1), "f4")
+        none = distance.Depths(np.zeros(3), 1.0, 1.0, one, one.astype("i4") - 1, one.astype("i2"))
         ocl.launch(device, distance.kernel(device, "depths"), (512,), points, *out, *distance.buffers(device, none),
                    *distance.tree_buffers(device, positions, triangles))  # fmt: skip
         assert np.array_equal(ocl.read(device, out[0], exact) > 0, inside)

@@ -1,6 +1,6 @@
 """Walks over a queue against each other, the path table and adding-doubling; and what every closed surface obeys."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -14,8 +14,11 @@ from lutgen.solvers import adding_doubling, path_table
 from lutgen.solvers.path_table import Medium
 from lutgen.tissue import Layer, Skin
 
+Rate = float | np.ndarray
+Place = np.ndarray | tuple[float, float, float]
 N = 2**20
 MU_S, G, INDEX, EPIDERMIS = 22.0, 0.78, 1.4, 0.1
+EDGES = np.concatenate([[0], np.geomspace(0.01, 8, 15), [np.inf]])
 ABSORBING = (2.0, 0.2)  # epidermis and dermis, 1/mm
 
 
@@ -24,7 +27,9 @@ def medium(nu: float = 0.2) -> Medium:
     return Medium(one[0], one[1], one[2], one[3], EPIDERMIS, INDEX)
 
 
-def entries(count: int, position=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0), cosine: float | np.ndarray = 1.0, seed: int = 0):
+def entries(
+    count: int, position: Place = (0, 0, 0), normal: Place = (0, 0, 1), cosine: Rate = 1.0, seed: int = 0
+) -> np.ndarray:
     """Entries [count] under a surface, the direction at that cosine inside and a random azimuth."""
     made = np.zeros(count, queues.ENTRY)
     made["position"], made["normal"], made["sample"] = position, normal, np.arange(count)
@@ -40,14 +45,14 @@ def walked(given: np.ndarray, through: Medium, depths: distance.Depths | None = 
     """Exits of entries and the tally."""
     device, tally = ocl.choose(), lockstep.Tally()
     K = len(through.wavelength_nm)
-    whole = queues.Part(**({"begin": 0, "end": len(given) // K, "first": 0, "samples": K} | part))
+    whole = replace(queues.Part(0, len(given) // K, 0, K), **part)
     buffers = ocl.buffer(device, given), ocl.buffer(device, np.zeros(len(given), queues.EXIT))
     inside = () if depths is None else tuple(distance.buffers(device, depths))
     lockstep.walk(through, *buffers, whole, seed, device, tally, inside)
     return ocl.read(device, buffers[1], np.zeros(len(given), queues.EXIT)), tally
 
 
-def weights(exits: np.ndarray, mu_epidermis=ABSORBING[0], mu_dermis=ABSORBING[1], nu: float = 0.2) -> np.ndarray:
+def weights(exits: np.ndarray, mu_epidermis: Rate = ABSORBING[0], mu_dermis: Rate = ABSORBING[1], nu: Rate = 0.2):
     """Share of its light that each exit brings, 0 where none left."""
     le, ld = (exits[name].astype(float) for name in ("path_epidermis_mm", "path_dermis_mm"))
     return np.where(ld >= 0, np.exp(-(mu_epidermis - nu) * le - (mu_dermis - nu) * ld), 0)
@@ -59,11 +64,14 @@ class Estimate:
     sigma: np.ndarray
 
 
-def estimate(weight: np.ndarray, where: np.ndarray | None = None, edges: np.ndarray | None = None) -> Estimate:
-    """Mean and standard error of weights, in rings of radius where given."""
-    if edges is None:
-        return Estimate(weight.mean(), weight.std() / np.sqrt(len(weight)))
-    sums, squares = (np.histogram(where, edges, weights=weight**k)[0] / len(weight) for k in (1, 2))
+def estimate(weight: np.ndarray) -> Estimate:
+    """Mean and standard error of weights."""
+    return Estimate(weight.mean(), weight.std() / np.sqrt(len(weight)))
+
+
+def by_ring(weight: np.ndarray, where: np.ndarray) -> Estimate:
+    """Weights' mean per ring of EDGES."""
+    sums, squares = (np.histogram(where, EDGES, weights=weight**k)[0] / len(weight) for k in (1, 2))
     return Estimate(sums, np.sqrt(np.maximum(squares - sums**2, 0) / len(weight)))
 
 
@@ -76,9 +84,6 @@ def slab(thickness_mm: float, side_mm: float = 60.0, cell_mm: float | None = Non
     box = trimesh.creation.box((side_mm, side_mm, thickness_mm))
     shifted = np.asarray(box.vertices) - (0, 0, thickness_mm / 2)
     return distance.of_mesh(shifted, np.asarray(box.faces), EPIDERMIS, ocl.choose(), cell_mm)
-
-
-EDGES = np.concatenate([[0], np.geomspace(0.01, 8, 15), [np.inf]])
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +106,7 @@ def test_the_flat_walk_is_the_path_table(under_flat_skin):
     sums, squares, _ = path_table.ring_sums(stack, EDGES, N, 3)
     table = Estimate(sums / N, np.sqrt((squares / N - (sums / N) ** 2) / N))
     w = weights(exits)
-    assert agree(estimate(w, radius(exits), EDGES), table)
+    assert agree(by_ring(w, radius(exits)), table)
     exact = lutgen.reflectance(stack).diffuse / medium().entry
     assert agree(estimate(w), Estimate(np.array(exact), np.array(0.0)))
 
@@ -112,7 +117,7 @@ def test_a_thick_slab_by_the_walk_inside_is_flat_skin(under_flat_skin):
     assert tally.lost == tally.unfinished == 0
     one, other = weights(found), weights(flat)
     assert agree(estimate(one), estimate(other))
-    assert agree(estimate(one, radius(found), EDGES), estimate(other, radius(flat), EDGES))
+    assert agree(by_ring(one, radius(found)), by_ring(other, radius(flat)))
     for value in (lambda e: e["path_epidermis_mm"], lambda e: e["path_dermis_mm"], lambda e: e["direction"][:, 2]):
         assert agree(estimate(one * value(found)), estimate(other * value(flat)))
     left = found["path_dermis_mm"] >= 0
@@ -192,8 +197,7 @@ def test_exits_do_not_depend_on_how_a_picture_was_cut():
     """Blocks of pixels, estimates and turns have streams of their own; empty places have no exit."""
     device = ocl.choose()
     size, K = lockstep.block(device), 2
-    two = Medium(*(np.array([v, v]) for v in (550.0, MU_S, G, 0.1)), EPIDERMIS, INDEX)
-    two.wavelength_nm[1] = 600.0
+    two = Medium(np.array([550.0, 600.0]), np.full(2, MU_S), np.full(2, G), np.full(2, 0.1), EPIDERMIS, INDEX)
     given = entries(3 * size * 2 * K)
     given["sample"][::7] = queues.EMPTY
     whole, tally = walked(given, two, begin=0, end=3 * size, samples=2 * K)
@@ -201,16 +205,17 @@ def test_exits_do_not_depend_on_how_a_picture_was_cut():
     assert np.all(whole["path_dermis_mm"][::7] < 0)
     by_pixel = given.reshape(3 * size, 2, K)
     cut = [walked(by_pixel[:size].ravel(), two, begin=0, end=size, samples=2 * K)[0]]
-    halves = [
-        walked(np.ascontiguousarray(by_pixel[size:, k]).ravel(), two, begin=size, end=3 * size, first=k * K, samples=K)[0]
-        for k in (0, 1)
-    ]
-    joined = np.stack([half.reshape(2 * size, K) for half in halves], axis=1)
+    halves = []
+    for k in (0, 1):
+        half = np.ascontiguousarray(by_pixel[size:, k]).ravel()
+        halves += [walked(half, two, begin=size, end=3 * size, first=k * K)[0].reshape(2 * size, K)]
+    joined = np.stack(halves, axis=1)
     assert np.concatenate([*cut, joined.ravel()]).tobytes() == whole.tobytes()
-    paths = [whole["path_dermis_mm"], walked(given, two, begin=0, end=3 * size, samples=2 * K, turn=1)[0]["path_dermis_mm"]]
-    paths += [walked(given, two, begin=0, end=3 * size, samples=2 * K, seed=2)[0]["path_dermis_mm"]]
-    paths += [whole.reshape(-1, 2, K)[:, ::-1].ravel()["path_dermis_mm"], whole.reshape(-1, K)[:, ::-1].ravel()["path_dermis_mm"]]
-    for other in paths[1:]:  # another turn, seed, estimate and wavelength
-        both = (paths[0] >= 0) & (other >= 0)
+    found = whole["path_dermis_mm"]
+    others = [walked(given, two, begin=0, end=3 * size, samples=2 * K, turn=1)[0]["path_dermis_mm"]]
+    others += [walked(given, two, None, 2, begin=0, end=3 * size, samples=2 * K)[0]["path_dermis_mm"]]
+    others += [found.reshape(-1, 2, K)[:, ::-1].ravel(), found.reshape(-1, K)[:, ::-1].ravel()]
+    for other in others:  # another turn, seed, estimate and wavelength
+        both = (found >= 0) & (other >= 0)
         assert both.sum() > 1000
-        assert np.mean(paths[0][both] == other[both]) < 0.01
+        assert np.mean(found[both] == other[both]) < 0.01

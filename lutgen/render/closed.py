@@ -32,9 +32,10 @@ def surface(positions_mm: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
     holes = [rim for rim in rims if np.any(positions[rim[:, 0], 1] > floor + _BASE * height)]
     if holes:
         wide = max(float(np.ptp(positions[rim[:, 0]], axis=0).max()) for rim in holes)
+        count = f"{len(holes)} hole{'s' * (len(holes) > 1)}, {sum(map(len, holes))} open edges"
         raise InputError(
-            f"mesh: {len(holes)} hole{'s' * (len(holes) > 1)}, {sum(map(len, holes))} open edges, the largest {wide:.1f} mm wide: a walk "
-            "inside needs a closed mesh; close them in your editor, or use --walk flat"
+            f"mesh: {count}, the largest {wide:.1f} mm wide: a walk inside needs a closed mesh; close them in your "
+            "editor, or use --walk flat"
         )
     for rim in rims:
         positions = np.concatenate([positions, positions[rim[:, 0]].mean(axis=0, keepdims=True)])

@@ -45,8 +45,8 @@ def spacing(extent_mm: np.ndarray) -> float:
     """Cell size in mm: 0.5, or a quarter of the mesh's least extent where that is less.
 
     Measured against exact distances on a scan with edges 3 mm long and on the built-in head (2 mm): half of all depths
-    near the surface are exact to 0.2 um (cells on flat triangles are), 99 % to 0.02 and 0.05 mm, 1 mm cells to 0.06 mm on
-    the scan. A feature thinner than twice the epidermis and a cell is not resolved.
+    near the surface are exact to 0.2 um (cells on flat triangles are), 99 % to 0.02 and 0.05 mm, and with 1 mm cells
+    to 0.06 mm on the scan. A feature thinner than twice the epidermis and a cell is not resolved.
     """
     return float(min(0.5, np.min(extent_mm) / 4))
 
@@ -62,8 +62,10 @@ def of_mesh(
     band = (-2 * cell, epidermis_mm + _BELOW_MM)
     size = np.array([cell, *band])
     code = np.frombuffer(ocl.source("trace", "depth", "distance").encode(), "u1")
-    modules = ("render/distance", "render/bvh")
-    made = cache.kept("depth", modules, lambda: _make(positions, corners, cell, band, device), size, positions, corners, code)
+    key = size, positions, corners, code
+    made = cache.kept(
+        "depth", ("render/distance", "render/bvh"), lambda: _make(positions, corners, cell, band, device), *key
+    )
     return Depths(made["origin_mm"], cell, _unit(cell, band), made["middles"], made["rows"], made["values"], notes)
 
 
@@ -72,16 +74,20 @@ def _unit(cell: float, band: tuple[float, float]) -> float:
     return (np.sqrt(3) * CELLS * cell + max(band)) / 32767
 
 
-def tree_buffers(device: ocl.Device, positions: np.ndarray, triangles: np.ndarray, width: int = 16):
+def tree_buffers(device: ocl.Device, positions: np.ndarray, triangles: np.ndarray):
     """A mesh's tree on the device: boxes, children, shapes, numbers."""
-    tree = bvh.build(positions, triangles, width)
+    tree = bvh.build(positions, triangles, _width(device))
     return [ocl.buffer(device, part) for part in (tree.boxes, tree.children, tree.triangles, tree.numbers)]
 
 
-def kernel(device: ocl.Device, entry: str, width: int = 16):
+def kernel(device: ocl.Device, entry: str):
     """A built kernel of kernels/distance.cl."""
     text = ocl.struct_source(device, (STRUCT,)) + ocl.source("trace", "depth", "distance")
-    return ocl.kernel(device, entry, text, {"WIDTH": width})
+    return ocl.kernel(device, entry, text, {"WIDTH": _width(device)})
+
+
+def _width(device: ocl.Device) -> int:
+    return max(device.lanes, 4)
 
 
 def _make(positions, triangles, cell: float, band: tuple[float, float], device: ocl.Device) -> dict[str, np.ndarray]:

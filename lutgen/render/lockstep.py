@@ -1,7 +1,7 @@
 """Full walks in lock step over a queue, under flat skin or inside the mesh (kernels/flat_walk.cl, mesh_walk.cl).
 
-Sample i of a pixel has the wavelength of index i % K. Paths are absorption-free with drawn lives, as the path table's: an
-exit weighs exp(-(mu_e - nu) Le - (mu_d - nu) Ld).
+Sample i of a pixel has the wavelength of index i % K. Paths are absorption-free with drawn lives, as the path table's:
+an exit weighs exp(-(mu_e - nu) Le - (mu_d - nu) Ld).
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _EVENTS_PER_LAUNCH = 4e7  # half a second of the slower walk on two cores
 
 @dataclass
 class Tally:
-    """What walks did: photons that entered, of which escaped, were lost off the surface (by a fold of the mesh) or given
-    up by the step budget; the others outlived their lives. Scattering events."""
+    """What walks did: photons that entered, of which escaped, were lost off the surface (by a fold of the mesh) or
+    given up by the step budget; the others outlived their lives. Scattering events."""
 
     entered: int = 0
     escaped: int = 0
@@ -53,7 +53,7 @@ def block(device: ocl.Device) -> int:
 def kernel(device: ocl.Device, inside: bool, before: str = ""):
     """The built kernel of either walk; `before` are definitions that replace its own."""
     structs, names = (*_STRUCTS, distance.STRUCT), ("depth", "anchors", "mesh_walk") if inside else ("flat_walk",)
-    text = before + ocl.struct_source(device, structs) + ocl.source("lanes", "rng", "optics", "queue", *names)
+    text = before + ocl.struct_source(device, structs) + ocl.source("lanes", "rng", "optics", "frame", "queue", *names)
     return ocl.kernel(device, names[-1], text, {"W": device.lanes})
 
 
@@ -107,7 +107,12 @@ def inside(on: Stage, seed: int = 0) -> queues.Staged:
     """Walks inside the stage's mesh; InputError for one with holes."""
     facts = on.luts.manifest["recipe"]["skin"]
     depths = distance.of_mesh(on.shape.positions_mm, on.shape.triangles, facts["epidermis_mm"], on.device)
-    told = {"walk": "mesh", "depth_cell_mm": depths.spacing_mm, "depth_bytes": depths.bytes, "notes": list(depths.notes)}
+    told = {
+        "walk": "mesh",
+        "depth_cell_mm": depths.spacing_mm,
+        "depth_bytes": depths.bytes,
+        "notes": list(depths.notes),
+    }
     return _staged(on, seed, told, tuple(distance.buffers(on.device, depths)))
 
 

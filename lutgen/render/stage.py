@@ -24,7 +24,7 @@ WAVE, NU = 10, 6
 """Columns of `waves`, and which of them is the life rate."""
 CHROMOPHORE_MAP = 7
 """Its place in a stage's arguments."""
-BASE = "lanes", "rng", "trace", "scene", "light", "paths", "moments"
+BASE = "lanes", "rng", "trace", "frame", "scene", "light", "paths", "moments"
 TALLIES = ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS", "HITS", "BACKS", "MISSES", "REJECTED", "BOUNCES", "BROKEN")
 """What kernels count: rays by kind (the first four); camera rays that met skin, and those on back faces; exits without
 a surface, or on one that faces away; paths from skin to skin; samples that were not finite."""
