@@ -63,6 +63,7 @@ def render(options: Namespace) -> Outcome:
         start = picture.empty(size, walk.group, facts) if before is None else before
 
         def save(made: picture.Picture, noise: float) -> None:
+            """Write what there is so far."""
             picture.write(made, out)
             if options.png:
                 _write_png(made, look, options.png)
@@ -122,6 +123,7 @@ def _interruptible() -> Iterator[Callable[[], bool]]:
     pressed = []
 
     def press(number, frame) -> None:
+        """Remember the first Ctrl-C."""
         if pressed:
             raise KeyboardInterrupt
         pressed.append(number)

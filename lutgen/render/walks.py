@@ -34,7 +34,9 @@ class Walk(Protocol):
     seconds: dict[str, float]
 
     @property
-    def pixels(self) -> int | None: ...
+    def pixels(self) -> int | None:
+        """Pixels of every call, or None."""
+        ...
 
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         """Add samples first ... first + samples - 1 of the pixels begin ... end - 1 to the buffers of moments
