@@ -95,19 +95,19 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
 
 
 def test_where_the_sky_is_hidden_light_comes_from_skin(plain):
-    """Under even light L a surface that sees nothing but skin has c L of it, and gives back c c L."""
+    """Half under even light L, half under skin that itself lies half open, c L / 2: together c L (1 / 2 + c / 4)."""
     surface = np.ones((1, 1, 4), "f4")
-    surface[..., 2] = 0
-    luts, look = lutgen.load(), Look(entry=0, light=0, azimuth=0, specular=0, distance_mm=300, environment=1)
-    c = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")
+    surface[..., 2] = 0.5
+    look = Look(entry=0, light=0, azimuth=0, specular=0, distance_mm=300, environment=1, transmission=0)
+    c = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")
     stages.set_environment(plain, np.full((8, 16, 3), 0.6))
     stages.set_map(plain, "surface", surface)
     found = linear(plain, look)[140:180, 140:180]
-    sunny = linear(plain, replace(look, light=4.0, light_azimuth=180, light_elevation=0, transmission=0))[160, 160]
+    behind = linear(plain, replace(look, light=4.0, light_azimuth=180, light_elevation=0))[160, 160]
     stages.set_map(plain, "surface", None)
     stages.set_environment(plain, None)
-    assert np.abs(found / (0.6 * c * c) - 1).max() < 0.01  # order 2 of 8 rows
-    assert sunny - found[20, 20] == pytest.approx(c * c * lighting.SUN / np.pi, rel=0.01)
+    assert np.abs(found / (0.6 * c * (1 / 2 + c / 4)) - 1).max() < 0.01  # harmonics of 8 rows
+    assert behind - found[20, 20] == pytest.approx(c * c / 4 * lighting.SUN / np.pi, rel=0.01)
 
 
 def test_an_exr_holds_the_radiance_behind_the_picture(plain, stage, tmp_path):

@@ -104,10 +104,10 @@ def skin_of(stage: Stage, look: Look) -> dict:
 
 
 def from_skin(stage: Stage, look: Look) -> np.ndarray:
-    """Irradiance [3] from where the head hides the sky: skin of the look's color, lit as skin is on the mean.
+    """Irradiance [3] where nothing is seen but open skin of the look's color, lit as skin is on the mean.
 
     On the mean over all normals a surface has a quarter of the sun's irradiance and all directions' mean of the
-    surroundings'; what that skin in turn lacks of both is left out.
+    surroundings'.
     """
     luts = stage.sides["none"].shown
     color = luts.color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")

@@ -6,7 +6,7 @@
 #include "pores.glsl"
 uniform sampler2D normal_map, chromophore_map, surface_map, detail_map, shadow_map;
 uniform vec3 light_direction, light_color, eye;
-uniform vec3 from_skin;           // irradiance from directions in which the head hides the sky
+uniform vec3 from_skin;           // irradiance from all around by skin that lies open
 uniform vec3 chromophores;        // melanin, eumelanin, hemoglobin: what the maps multiply
 uniform vec3 chromophores_low, chromophores_high;  // what the LUT set covers
 uniform vec2 contrast;            // exponents of the melanin and hemoglobin ratios: freckles fade on dark skin
@@ -79,7 +79,8 @@ void main() {
     float rough = rougher(clamp(roughness * surface.x, 0.15, 1.0), unseen), rough2 = rougher(clamp(roughness * surface.x * SECOND_LOBE, 0.1, 1.0), unseen);
     vec2 albedo = lobe_albedo(nv, rough);
 
-    vec3 sky = (open * irradiance(mapped.xyz) + (1.0 - open) * from_skin) * mix(1.0, environment_entry, entry);
+    vec3 hidden = open * from_skin;  // skin that hides the sky lies about as open as what it hides it from
+    vec3 sky = mix(hidden, irradiance(mapped.xyz), open) * mix(1.0, environment_entry, entry);
     entering = vec4(sun * received * mix(1.0, entry_factor(nl), entry) + sky, -view_position.z);
     facing = vec4(normalize(view_normal), mix(1.0, exit_factor(albedo, rough), entry));
 
@@ -91,7 +92,7 @@ void main() {
     float grazing = clamp(pow(nv + open, exp2(-16.0 * rough - 1.0)) - 1.0 + open, 0.0, 1.0);
     vec3 around = mix(reflected(n, v, nv, rough) * environment_lobe(albedo),
                       reflected(n, v, nv, rough2) * environment_lobe(lobe_albedo(nv, rough2)), SECOND_WEIGHT);
-    around = mix(environment_lobe(albedo) * from_skin / 3.14159265, around, grazing);
+    around = mix(environment_lobe(albedo) * hidden / 3.14159265, around, grazing);
     vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + around;
     // Only where the far side is what the light meets first: no glow in nostrils that the nose shades.
     float covered = (light_position.z - textureLod(shadow_map, light_position.xy, 0.0).r) * light_range_mm;

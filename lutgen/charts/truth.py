@@ -1,0 +1,165 @@
+"""The viewer's tiers against a render of the same scene: color differences over what a frame costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from math import log10
+from pathlib import Path
+
+import numpy as np
+
+import lutgen
+from lutgen import device as ocl
+from lutgen import extras, scene, subject
+from lutgen.charts import drawing
+from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
+from lutgen.errors import MachineError
+from lutgen.render import difference, picture, pictures, progressive, stage, walks
+from lutgen.scene import Look
+
+VIEWS = {
+    "portrait": Look(),
+    "close-up": Look(distance_mm=60.0, target_mm=(20.0, -30.0, 88.0)),
+}
+"""The default look at 1.3 mm per pixel of a picture of 192 x 192, and a nose's shadow at 0.36."""
+_MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.36}
+QUICK = {"tiers": ("off", "medium", "high"), "tones": ("light", "dark"), "side": 96, "samples": 32, "rounds": 1,
+         "timed": (320, 180)}  # fmt: skip
+FULL = {"tiers": scene.TIERS, "tones": ("very-light", "light", "intermediate", "tan", "brown", "dark"), "side": 192,
+        "samples": 64, "rounds": 3, "timed": (640, 360)}  # fmt: skip
+_WIDE, _HIGH = 13.4, 6.3
+_MARKS = "os"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One tier in one view and tone: its frame, and ΔE00 of boxes of 4 x 4 pixels from the render."""
+
+    view: str
+    tone: str
+    tier: str
+    milliseconds: float
+    ratio: float
+    mean: float
+    mean_sigma: float
+    p95: float
+    p95_of_noise: float
+    lightness: float
+
+
+def truth(folder: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> str:
+    """The chart `truth`; its main figures in words, or why it was left out: it needs OpenGL and the extra `view`."""
+    try:
+        extras.viewer("gl").context()
+        app = extras.viewer("app")
+    except MachineError as error:
+        return f"left out: {error}"
+    extent = QUICK if quick else FULL
+    timing, stages = extras.viewer("timing"), extras.viewer("stages")
+    opened = app.open_stage(lutgen.load(), *subject.model(None, None, None), extent["timed"])
+    try:
+        told = {"rounds": extent["rounds"], "progress": lambda name: progress(name, None)}
+        _, costs = timing.costs(opened, Look(), extent["tiers"], **told)
+    finally:
+        stages.release(opened)
+    rows = differences({cost.name: cost for cost in costs}, extent, progress)
+    draw(folder, rows, extent)
+    return words(rows)
+
+
+def differences(costs: dict, extent: dict, progress: Callable = lambda stage, tally: None) -> list[Row]:
+    """Every tier of `costs` in every view and tone, the built-in head."""
+    app, stages, side = extras.viewer("app"), extras.viewer("stages"), extent["side"]
+    shape, given = subject.model(None, None, None)
+    rows = []
+    opened = app.open_stage(lutgen.load(), shape, given, (side, side))
+    try:
+        for view, look in VIEWS.items():
+            for tone in extent["tones"]:
+                progress(f"render: {view}, {tone}", None)
+                skin = scene.of_preset(tone, look)
+                true = rendered(shape, given, skin, side, extent["samples"])
+                for tier, cost in costs.items():
+                    found = difference.compare(true, seen(opened, replace(skin, tier=tier)))
+                    rows.append(Row(view, tone, tier, cost.total, cost.ratio, found.mean.value, found.mean.sigma,
+                                    found.p95.value, found.noise_alone[2], found.lightness.value))  # fmt: skip
+    finally:
+        stages.release(opened)
+    return rows
+
+
+def rendered(shape, given, look: Look, side: int, samples: int, seed: int = 0) -> pictures.Picture:
+    """The scene traced by the flat walk, side x side pixels."""
+    opened = stage.open_stage(ocl.choose(), lutgen.load(), shape, given, look, (side, side), seed=seed)
+    walk = walks.flat(opened, seed)
+    start, goal = picture.empty((side, side), walk.group, {}), progressive.Goal(samples=samples)
+    made, _, _ = progressive.render(opened, walk, start, goal, lambda made, noise: None)
+    return pictures.Picture("render", made.rgb, made.covariance(), made.mask)
+
+
+def seen(opened, look: Look) -> pictures.Picture:
+    """The scene as the viewer has it before exposure and tone curve."""
+    passes = extras.viewer("passes")
+    passes.draw(opened, look)
+    light, skin = passes.radiance(opened)
+    return pictures.Picture("view", light, None, skin)
+
+
+def worst(rows: list[Row], view: str, tier: str) -> tuple[float, float]:
+    """The largest mean and the largest p95 of all tones."""
+    found = [row for row in rows if (row.view, row.tier) == (view, tier)]
+    return max(row.mean for row in found), max(row.p95 for row in found)
+
+
+def words(rows: list[Row]) -> str:
+    """The main figures of the chart in a line."""
+    tiers = list(dict.fromkeys(row.tier for row in rows))
+    each = []
+    for view in VIEWS:
+        figures = (f"{tier} {mean:.2f} / {p95:.2f}" for tier in tiers for mean, p95 in [worst(rows, view, tier)])
+        each.append(f"{view} {', '.join(figures)}")
+    return f"ΔE00 from a render, mean / p95 of the worst tone: {'; '.join(each)}"
+
+
+def draw(folder: Path, rows: list[Row], extent: dict) -> None:
+    """Write the chart `truth`."""
+    width, height = extent["timed"]
+    notes = (
+        f"Built-in head, default light, {len(extent['tones'])} tones: the viewer's linear frame against `lutgen render "
+        f"--walk flat` of {extent['samples']} samples a pixel, {extent['side']} × {extent['side']},\nboxes of 4 × 4 "
+        "pixels, noise taken off (`lutgen compare`). Lines: worst tone; bands: all tones. "
+        f"Cost: a frame of {width} × {height} over that of a plain head."
+    )
+    with drawing.figure(_WIDE, _HIGH, "How far the viewer is from a traced picture, and what a tier buys", notes) as drawn:
+        for k, (figure, title) in enumerate((("mean", "mean ΔE00 of boxes"), ("p95", "ΔE00 that 95 % of boxes are below"))):
+            _panel(inches(drawn, 0.85 + 6.75 * k, 1.75, 4.1, 3.95), rows, figure, title)
+        drawing.save(drawn, folder, "truth", [asdict(row) for row in rows])
+
+
+def _panel(axes, rows: list[Row], figure: str, title: str) -> None:
+    tiers = list(dict.fromkeys(row.tier for row in rows))
+    ratio = {row.tier: row.ratio for row in rows}
+    most, top = max(ratio.values()), 1.15 * max(getattr(row, figure) for row in rows)
+    axes.set(xscale="log", xlim=(1.0, most * 1.12), ylim=(0, top), xlabel="frame time over a plain head's")
+    axes.set_title(title, color=INK, pad=26)
+    ticks = [v for v in ((1, 2, 5, 10, 20, 50) if most > 5 else (1, 1.5, 2, 3)) if v <= most * 1.12]
+    axes.set_xticks(ticks, [f"{v:g} ×" for v in ticks])
+    axes.xaxis.set_minor_formatter("")
+    axes.grid(axis="y")
+    axes.set_axisbelow(True)
+    places = drawing.apart([log10(ratio[tier]) for tier in tiers], 0.13 * log10(most * 1.12))
+    for tier, place in zip(tiers, places, strict=True):
+        axes.axvline(ratio[tier], color=drawing.RULE, linewidth=0.8, zorder=0)
+        axes.annotate(tier, (ratio[tier], top), (10**place, top * 1.035), color=GRAY, size=8.5, ha="center",
+                      annotation_clip=False, va="bottom",
+                      arrowprops={"arrowstyle": "-", "color": drawing.RULE, "linewidth": 0.8, "shrinkA": 0,
+                                  "shrinkB": 0})  # fmt: skip
+    labels = []
+    for k, view in enumerate(VIEWS):
+        x = [ratio[tier] for tier in tiers]
+        found = np.array([[getattr(row, figure) for row in rows if (row.view, row.tier) == (view, tier)] for tier in tiers])
+        axes.fill_between(x, found.min(axis=1), found.max(axis=1), color=HUES[k], alpha=0.12, linewidth=0)
+        axes.plot(x, found.max(axis=1), linestyle=DASHES[k], color=HUES[k], marker=_MARKS[k], markersize=5.5)
+        labels.append((float(found[-1].max()), f"{view}, {_MM_PER_PIXEL[view] * 192 / 192:g} mm", HUES[k]))
+    drawing.label_ends(axes, most, labels, 0.06 * top)
