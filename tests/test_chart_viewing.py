@@ -80,12 +80,12 @@ def test_where_it_cannot_be_drawn_the_others_are(missing, tmp_path, monkeypatch)
         monkeypatch.setattr(viewing.extras, "viewer", lambda _: SimpleNamespace(context=without))
     else:
         monkeypatch.setattr(viewing.extras, "viewer", without)
-    for module in (chart.speed, chart.shapes, chart.settings, chart.walks):
+    for module in (chart.speed, chart.shapes, chart.settings, chart.walks, chart.truth):
         monkeypatch.setattr(
             module, module.__name__.split(".")[-1], lambda folder, *_: (folder / "x").write_text("") or ""
         )
     shown = chart.draw(tmp_path / "out", quick=True)
-    assert list(shown) == ["speed-accuracy", "profiles", "settings", "walks", "viewing"]
+    assert list(shown) == ["speed-accuracy", "profiles", "settings", "walks", "viewing", "truth"]
     assert shown["viewing"].startswith("left out: no OpenGL 3.3 (no display)")
     assert "\n" not in shown["viewing"]
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["x"]

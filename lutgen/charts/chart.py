@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from lutgen.charts import drawing, settings, shapes, speed, viewing, walks
+from lutgen.charts import drawing, settings, shapes, speed, truth, viewing, walks
 
 
 def draw(out: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> dict[str, str]:
     """Draw every chart into the folder `out`, which appears whole or not at all; what each shows, by its name.
 
     `quick` takes fewer photons, seeds and skins. Raises InputError where `out` holds something, MachineError without
-    matplotlib or OpenCL; without OpenGL one chart is left out, and its line says why.
+    matplotlib or OpenCL; without OpenGL two are left out, and their lines say why.
     """
     with drawing.folder(out) as folder:
         shown = {"speed-accuracy": speed.speed(folder, quick, progress)}
@@ -22,4 +22,5 @@ def draw(out: Path, quick: bool = False, progress: Callable = lambda stage, tall
         progress("walks", None)
         shown["walks"] = walks.walks(folder, quick)
         shown["viewing"] = viewing.viewing(folder, quick, progress)
+        shown["truth"] = truth.truth(folder, quick, progress)
     return shown

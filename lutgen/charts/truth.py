@@ -22,8 +22,8 @@ VIEWS = {
     "portrait": Look(),
     "close-up": Look(distance_mm=60.0, target_mm=(20.0, -30.0, 88.0)),
 }
-"""The default look at 1.3 mm per pixel of a picture of 192 x 192, and a nose's shadow at 0.36."""
-_MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.36}
+"""The default look at 1.3 mm per pixel of a picture of 192 x 192, and the shadow of the nose at 0.13."""
+_MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.13}
 QUICK = {"tiers": ("off", "medium", "high"), "tones": ("light", "dark"), "side": 96, "samples": 32, "rounds": 1,
          "timed": (320, 180)}  # fmt: skip
 FULL = {"tiers": scene.TIERS, "tones": ("very-light", "light", "intermediate", "tan", "brown", "dark"), "side": 192,
@@ -131,8 +131,12 @@ def draw(folder: Path, rows: list[Row], extent: dict) -> None:
         "pixels, noise taken off (`lutgen compare`). Lines: worst tone; bands: all tones. "
         f"Cost: a frame of {width} × {height} over that of a plain head."
     )
-    with drawing.figure(_WIDE, _HIGH, "How far the viewer is from a traced picture, and what a tier buys", notes) as drawn:
-        for k, (figure, title) in enumerate((("mean", "mean ΔE00 of boxes"), ("p95", "ΔE00 that 95 % of boxes are below"))):
+    with drawing.figure(
+        _WIDE, _HIGH, "How far the viewer is from a traced picture, and what a tier buys", notes
+    ) as drawn:
+        for k, (figure, title) in enumerate(
+            (("mean", "mean ΔE00 of boxes"), ("p95", "ΔE00 that 95 % of boxes are below"))
+        ):
             _panel(inches(drawn, 0.85 + 6.75 * k, 1.75, 4.1, 3.95), rows, figure, title)
         drawing.save(drawn, folder, "truth", [asdict(row) for row in rows])
 
@@ -158,8 +162,10 @@ def _panel(axes, rows: list[Row], figure: str, title: str) -> None:
     labels = []
     for k, view in enumerate(VIEWS):
         x = [ratio[tier] for tier in tiers]
-        found = np.array([[getattr(row, figure) for row in rows if (row.view, row.tier) == (view, tier)] for tier in tiers])
+        found = np.array(
+            [[getattr(row, figure) for row in rows if (row.view, row.tier) == (view, tier)] for tier in tiers]
+        )
         axes.fill_between(x, found.min(axis=1), found.max(axis=1), color=HUES[k], alpha=0.12, linewidth=0)
         axes.plot(x, found.max(axis=1), linestyle=DASHES[k], color=HUES[k], marker=_MARKS[k], markersize=5.5)
-        labels.append((float(found[-1].max()), f"{view}, {_MM_PER_PIXEL[view] * 192 / 192:g} mm", HUES[k]))
+        labels.append((float(found[-1].max()), f"{view}, {_MM_PER_PIXEL[view]:g} mm", HUES[k]))
     drawing.label_ends(axes, most, labels, 0.06 * top)
