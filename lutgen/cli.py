@@ -175,9 +175,7 @@ def _parser() -> argparse.ArgumentParser:
 
     for command in (bake, swatch, bench, render):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
-    for command in (
-        bake, swatch, fit, info, devices, check, bench, figures, chart, stability, view, sheet, render, compare, export, maps,
-    ):  # fmt: skip
+    for command in commands.choices.values():
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 
