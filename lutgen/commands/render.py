@@ -63,6 +63,7 @@ def render(options: Namespace) -> Outcome:
         start = picture.empty(size, walk.group, facts) if before is None else before
 
         def save(made: picture.Picture, noise: float) -> None:
+            """Write what there is so far."""
             picture.write(made, out)
             if options.png:
                 _write_png(made, look, options.png)
@@ -76,26 +77,29 @@ def render(options: Namespace) -> Outcome:
 
 
 def _report(options, made, tally, noise: float, walk, seconds: dict, notes: tuple, interrupted: bool) -> Outcome:
-    stages = getattr(walk, "seconds", {})
     seconds |= {"sample": tally.seconds.get("sample", 0.0), "write": tally.seconds.get("write", 0.0)}
-    sampled = max(seconds["sample"], 1e-9)
-    events = getattr(walk, "events", 0)
+    sampled, walked = max(seconds["sample"], 1e-9), max(walk.seconds.get("walk", 0.0), 1e-9)
     counts, probes = tally.counts, max(tally.counts.get("PROBES", 0), 1)
     result = {
         "out": options.out, "samples": made.samples, "noise_delta_e00": noise if np.isfinite(noise) else None,
-        "walk": walk.facts, "rays": tally.rays, "rays_per_s": tally.rays / sampled, "events": events,
-        "events_per_s": events / max(stages.get("walk", 0.0), 1e-9) if events else 0.0, "counts": counts,
-        "seconds": seconds | stages, "notes": list(notes), "interrupted": interrupted,
+        "walk": walk.facts, "rays": tally.rays, "rays_per_s": tally.rays / sampled,
+        "events": walk.events, "events_per_s": walk.events / walked, "counts": counts, "seconds": seconds,
+        "stages": walk.seconds, "notes": list(notes), "interrupted": interrupted,
     }  # fmt: skip
     whole_time = sum(seconds.values())
     shares = ", ".join(f"{name} {100 * value / whole_time:.0f} %" for name, value in seconds.items())
-    inner = "; ".join(f"{name} {100 * value / sampled:.0f} %" for name, value in stages.items())
-    said = "unknown with one sample" if not np.isfinite(noise) else f"ΔE00 {noise:.2f} a pixel"
+    inner = ", ".join(f"{name} {value:.2f} s" for name, value in walk.seconds.items())
+    kinds = ", ".join(
+        f"{name} {100 * counts.get(key, 0) / max(tally.rays, 1):.0f} %"
+        for name, key in (("camera", "CAMERA_RAYS"), ("exit", "PROBES"), ("sun", "SUN_RAYS"), ("sky", "SKY_RAYS"))
+    )
+    said = "unknown from so few" if not np.isfinite(noise) else f"ΔE00 {noise:.2f} a pixel"
     lines = [
-        f"{options.out}: {made.samples} samples, noise {said}" + (" (interrupted; goes on)" if interrupted else ""),
-        f"{tally.rays / 1e6:.1f} M rays, {tally.rays / sampled / 1e6:.2f} M/s"
-        + (f"; {events / 1e9:.2f} G events" if events else ""),
-        f"{whole_time:.1f} s: {shares}" + (f" (sample: {inner})" if inner else ""),
+        f"{options.out}: {made.samples} samples, noise {said}"
+        + (" (interrupted; the same command goes on)" if interrupted else ""),
+        f"{tally.rays / 1e6:.1f} M rays, {tally.rays / sampled / 1e6:.2f} M/s ({kinds}); "
+        f"{walk.events / 1e9:.2f} G events, {walk.events / walked / 1e6:.0f} M/s",
+        f"{whole_time:.1f} s: {shares}; stages: {inner}",
         f"exits without a surface {100 * counts.get('MISSES', 0) / probes:.2g} %, on one that faces away "
         f"{100 * counts.get('REJECTED', 0) / probes:.2g} %: lit where they entered",
     ]
@@ -119,6 +123,7 @@ def _interruptible() -> Iterator[Callable[[], bool]]:
     pressed = []
 
     def press(number, frame) -> None:
+        """Remember the first Ctrl-C."""
         if pressed:
             raise KeyboardInterrupt
         pressed.append(number)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -23,14 +24,19 @@ class Walk(Protocol):
     """An opened way to take samples.
 
     `group`: samples that make one whole estimate; counts of samples are multiples of it. `pixels`: how many each call
-    must take, with one estimate each; None: any, and any number of samples. `facts`: for the manifest.
+    must take, with one estimate each; None: any, and any number of samples. `facts`: for the manifest. `events` and
+    `seconds` by stage, "walk" among them: of scattering so far.
     """
 
     group: int
     facts: dict
+    events: int
+    seconds: dict[str, float]
 
     @property
-    def pixels(self) -> int | None: ...
+    def pixels(self) -> int | None:
+        """Pixels of every call, or None."""
+        ...
 
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         """Add samples first ... first + samples - 1 of the pixels begin ... end - 1 to the buffers of moments
@@ -45,33 +51,36 @@ class Flat:
     kernel: object
     tables: tuple
     facts: dict
+    events: int
+    seconds: dict[str, float]
     group: int = GROUP
     pixels: int | None = None
 
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         numbers = (np.uint32(v) for v in (begin, end, first, samples))
-        shape = (stage.items(self.stage, end - begin),)
-        ocl.launch(
-            self.stage.device, self.kernel, shape, *self.stage.arguments, *self.tables, *numbers, moments, tallies
-        )
+        shape, scene, since = (stage.items(self.stage, end - begin),), self.stage.arguments, time.perf_counter()
+        ocl.launch(self.stage.device, self.kernel, shape, *scene, *self.tables, *numbers, moments, tallies)
+        self.seconds["pictures"] += time.perf_counter() - since
 
 
-def flat(on: Stage, seed: int = 0, photons: int = exits.EXITS) -> Flat:
+def flat(on: Stage, seed: int = 0, photons: int | None = None) -> Flat:
     """Trace the exits of the stage's skin and open the flat walk over them."""
     melanin, eumelanin, hemoglobin = (float(v) for v in on.view["chromophores"])
     skin = melanin, eumelanin, hemoglobin
-    found = exits.trace(on.device, on.luts, skin, photons, seed)
+    since = time.perf_counter()
+    found = exits.trace(on.device, on.luts, skin, photons or exits.EXITS, seed)
+    seconds = {"walk": time.perf_counter() - since, "pictures": 0.0}
     built = stage.kernel(
         on, "flat", "places", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1],
         SECTORS=exits.SECTORS, GROUP=GROUP, DRAWS=DRAWS, LEAST_COSINE=float(found.cosines[0]), REACH=REACH,
     )  # fmt: skip
     color, sigma = found.color(on.luts, skin)
     facts = {
-        "walk": "flat", "exits_per_wavelength_and_angle": photons, "angles": len(found.cosines),
-        "rings": len(found.radius_edges_mm) - 1, "sectors": exits.SECTORS, "events": found.events,
+        "walk": "flat", "exits_per_wavelength_and_angle": found.photons, "angles": len(found.cosines),
+        "rings": len(found.radius_edges_mm) - 1, "sectors": exits.SECTORS,
         "color_acescg": color.tolist(), "color_std_error_acescg": sigma.tolist(), "reach": REACH,
     }  # fmt: skip
-    return Flat(on, built, exits.buffers(on.device, found), facts)
+    return Flat(on, built, exits.buffers(on.device, found), facts, found.events, seconds)
 
 
 WALKS: dict[str, Callable[..., Walk]] = {"flat": flat, "flat-full": lockstep.flat, "mesh": lockstep.inside}
