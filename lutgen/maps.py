@@ -136,6 +136,11 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
     )  # fmt: skip
 
 
+def ratio(path: Path) -> np.ndarray:
+    """The ratios [rows, columns] that a chromophore map holds; its name says which."""
+    return _decoded(Path(path).stem, *read(path))
+
+
 def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:
     """What a map's texels stand for; thickness as a share of 32 mm."""
     if name in ("normal", "albedo"):
