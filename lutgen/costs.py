@@ -37,14 +37,18 @@ def _file() -> tuple[dict[str, tuple[float, float]], dict[str, float], tuple[Tie
     """Trace (fixed, per photon) by rule, the rest's coefficients, tiers from cheap to dear, and the header."""
     lines = (files("lutgen.data") / "plan.csv").read_text(encoding="utf-8").splitlines()
     trace, rest, found = {}, {}, {}
-    for kind, name, *cells in (line.split(",") for line in lines if not line.startswith("#")):
+    for line in lines:
+        if line.startswith("#"):
+            continue
+        kind, name, *cells = line.split(",")
         if kind == "trace":
             trace[name] = float(cells[0]), float(cells[1])
         elif kind == "rest":
             rest[name] = float(cells[0])
         else:
             found.setdefault((name, int(cells[0])), []).append((float(cells[1]), float(cells[2])))
-    return trace, rest, tuple(Tier(*key, tuple(values)) for key, values in found.items()), lines[0].removeprefix("# ")
+    tiers = tuple(Tier(name, taps, tuple(values)) for (name, taps), values in found.items())
+    return trace, rest, tiers, lines[0].removeprefix("# ")
 
 
 def measured_with() -> str:
@@ -62,8 +66,10 @@ def seconds(recipe: Recipe) -> dict[str, float]:
     trace, rest, _, _ = _file()
     fixed, per_photon = trace[recipe.wavelengths]
     color, profile = (int(np.prod(grid.shape)) for grid in (recipe.color, recipe.profile))
-    other = rest["start"] + rest["color node"] * color + profile * (
-        rest["profile node"] + rest["ring of a node"] * recipe.rings
+    other = (
+        rest["start"]
+        + rest["color node"] * color
+        + profile * (rest["profile node"] + rest["ring of a node"] * recipe.rings)
     )
     return {"trace": fixed + per_photon * recipe.photons, "rest": other}
 

@@ -42,7 +42,7 @@ class Needs:
     hemoglobin: Range = (USUAL["hemoglobin"],) * 2
     oxygenation: Range = (USUAL["oxygenation"],) * 2
     tolerance: float = 0.5
-    ee_tolerance: float | None = None
+    ee_tolerance: float = 0.025
     mm_per_pixel: float = 0.2
     bytes: int | None = None
     seconds: float | None = None
@@ -54,8 +54,6 @@ class Needs:
         for name in VARIABLE:
             put(name, _range(name, getattr(self, name)))
         put("tolerance", in_range("tolerance", self.tolerance, *TOLERANCE, " ΔE00"))
-        if self.ee_tolerance is None:
-            put("ee_tolerance", float(np.clip(self.tolerance * EE_PER_DELTA_E00, 0.002, 0.1)))
         put("ee_tolerance", in_range("ee_tolerance", self.ee_tolerance, *EE_TOLERANCE))
         put("mm_per_pixel", in_range("mm_per_pixel", self.mm_per_pixel, *MM_PER_PIXEL))
         if self.bytes is not None:
@@ -93,7 +91,18 @@ def _range(name: str, given: object) -> Range:
     return low, high
 
 
-def scene(tones: str = "all", vary: str | None = None, **limits) -> Needs:
+def usual_ee_tolerance(tolerance: float) -> float:
+    """The tolerance of encircled energy that goes with one of color, .002 to .1.
+
+    >>> usual_ee_tolerance(0.5)
+    0.025
+    """
+    return float(np.clip(tolerance * EE_PER_DELTA_E00, 0.002, 0.1))
+
+
+def scene(
+    tones: str = "all", vary: str | None = None, tolerance: float = 0.5, ee_tolerance: float | None = None, **limits
+) -> Needs:
     """Needs from the words of the command line; `limits` are the other fields of Needs.
 
     `tones`: `all`, presets, NAME=VALUE, NAME=LOW:HIGH and a map (a picture by its name, or a folder of them),
@@ -114,13 +123,16 @@ def scene(tones: str = "all", vary: str | None = None, **limits) -> Needs:
             ranges[name] = ALLOWED_TONES[name]
     for name, (low, high) in ratios.items():
         least, most = ALLOWED_TONES[name]
-        ranges[name] = tuple(float(np.clip(v, least, most)) for v in (ranges[name][0] * low, ranges[name][1] * high))
+        low, high = np.clip((ranges[name][0] * low, ranges[name][1] * high), least, most)
+        ranges[name] = float(low), float(high)
     for name, (low, high) in ranges.items():
         if vary is not None and name not in named and low < high:
             raise InputError(
                 f"vary = {vary}: the tones hold {name} from {low:g} to {high:g}; add {name}, or give it one value"
             )
-    return Needs(**ranges, **limits)
+    tolerance = in_range("tolerance", tolerance, *TOLERANCE, " ΔE00")
+    energy = usual_ee_tolerance(tolerance) if ee_tolerance is None else ee_tolerance
+    return Needs(**ranges, tolerance=tolerance, ee_tolerance=energy, **limits)
 
 
 def _parts(parts: list[str], whole_of: Iterable[str]) -> tuple[dict[str, Range], dict[str, Range]]:
@@ -139,13 +151,14 @@ def _parts(parts: list[str], whole_of: Iterable[str]) -> tuple[dict[str, Range],
                 low, high = spans.get(key, (np.inf, -np.inf))
                 spans[key] = min(low, getattr(skin, key)), max(high, getattr(skin, key))
         elif equals:
-            spans[one_of("tones", name, VARIABLE)] = _range(name, _numbers(name, value))
+            one_of("tones", name, VARIABLE)
+            spans[name] = _range(name, _numbers(name, value))
         elif Path(part).exists():
             ratios.update(_map_ratios(Path(part)))
         else:
             raise InputError(
-                f"tones = {shown(part)}: allowed is all, {', '.join(PRESETS)}, {'|'.join(VARIABLE)}=VALUE or =LOW:HIGH, "
-                "a map or a folder of maps"
+                f"tones = {shown(part)}: allowed is all, {', '.join(PRESETS)}, {'|'.join(VARIABLE)}=VALUE or "
+                "=LOW:HIGH, a map or a folder of maps"
             )
     return spans, ratios
 

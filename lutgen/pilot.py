@@ -106,11 +106,11 @@ def noise(
     at mu1 + mu2 - nu, so the table holds every covariance; paths that leave in different rings are independent but
     for the fixed number of photons, which anchoring takes out.
     """
-    roots = [chebyshev(*np.cbrt(span), count) for span in spans]
+    roots = [chebyshev(np.cbrt(low), np.cbrt(high), count) for low, high in spans]
     flat = np.repeat(roots[0], count, axis=1) ** 3, np.tile(roots[1], (1, count)) ** 3
     nu, A = nu_per_mm[:, None, None], count * count
-    sums = [(mu[:, :, None] + mu[:, None, :] - nu).reshape(len(nu_per_mm), -1) for mu in flat]
-    covariance = table.evaluate(*sums).reshape(*table.energy.shape[:2], A, A) * table.entry
+    both_e, both_d = ((mu[:, :, None] + mu[:, None, :] - nu).reshape(len(nu_per_mm), -1) for mu in flat)
+    covariance = table.evaluate(both_e, both_d).reshape(*table.energy.shape[:2], A, A) * table.entry
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0))[..., None, :]
     drawn = np.random.default_rng(seed).standard_normal((draws, *root.shape[:3]))

@@ -16,7 +16,7 @@ from lutgen import chromophores, color, expansion, pilot, profiles, quadrature
 from lutgen.axes import Grid
 from lutgen.needs import Needs, panel
 from lutgen.solvers import totals
-from lutgen.tissue import Skin
+from lutgen.tissue import REFRACTIVE_INDEX, Skin
 
 PERCENTILE = 95
 BAKES = 8
@@ -80,6 +80,20 @@ class Colors:
             for oxygenation in self.needs.oxygenations
         ]
         return self._worst([grid.interpolate(values, *self.skins) for values in self.cells(rule, grid)], truth)
+
+    def noise(self, rule: str, photons: int) -> float:
+        """What totals that are not anchored would err by, by a draw of the noise of each skin and wavelength."""
+        chosen, rng = quadrature.load(rule), np.random.default_rng(SEED)
+        nm, found, right = chosen.wavelength_nm, [], []
+        nu = np.minimum(chromophores.epidermis_range(nm)[0], chromophores.dermis_range(nm)[0])[:, None]
+        entry = 1 - ((REFRACTIVE_INDEX - 1) / (REFRACTIVE_INDEX + 1)) ** 2
+        for oxygenation in self.needs.oxygenations:
+            mu = expansion.coefficients(nm, expansion.absorbers(nm, oxygenation), *self.skins)
+            R, doubled = self.exact(nm, *mu), self.exact(nm, *(2 * v - nu for v in mu))
+            sigma = np.sqrt(np.maximum(entry * doubled - R**2, 0) / photons)
+            found.append((R + sigma * rng.standard_normal(R.shape)).T @ chosen.xyz_weights)
+            right.append(color.lab(R.T @ chosen.xyz_weights))
+        return self._worst(found, right)
 
     def cells(self, rule: str, grid: Grid) -> list[np.ndarray]:
         """Exact XYZ [N_h, N_e, N_m, 3] of every node, per oxygenation."""
@@ -225,7 +239,7 @@ class Profiles:
             spans = [_widened(np.concatenate([pair[layer] for pair in mu], axis=1)) for layer in (0, 1)]
             drawn, roots = pilot.noise(table, nu, (spans[0], spans[1]), DRAWS, SEED)
             at_radii = np.einsum("rb,skbij->srkij", pilot.within(pilot.edges(), self.radius_mm)[:, 1:], drawn)
-            S, R, K = at_radii.shape[:3]
+            S, R = at_radii.shape[:2]
             flat = at_radii.reshape(S * R, -1).astype("f4")
             found = np.empty((S, len(mu), len(self.skins[0]), 3, R), "f4")
             for o, pair in enumerate(mu):

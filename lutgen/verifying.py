@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lutgen import baking, color, expansion, pilot, prediction, profiles, quadrature
+from lutgen import device as ocl
 from lutgen.config import Recipe
 from lutgen.lutset import LutSet
 from lutgen.needs import Needs
@@ -31,6 +32,7 @@ class Measured:
     profile: list[float]
     profile_max: float
     parts: dict[str, dict[str, float]]
+    """Each part alone, of the first bake; a profile's noise of the worst."""
     trace_seconds: float
 
     def holds(self, needs: Needs) -> bool:
@@ -42,10 +44,11 @@ class Measured:
 class Truth:
     """Random skins of a scene with their exact colors and well-traced profiles, and what bakes of it share.
 
-    `lab` [O, P, 3], `encircled` [O, Q, 3, R] at `radius_mm` [R], per oxygenation.
+    `lab` [O, P, 3], `encircled` [O, Q, 3, R] at `radius_mm` [R], per oxygenation; `traced`: what they were read from.
     """
 
     needs: Needs
+    traced: PathTable
     exact: totals.ExactTotals
     color_skins: tuple[np.ndarray, np.ndarray, np.ndarray]
     profile_skins: tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -54,10 +57,10 @@ class Truth:
     encircled: np.ndarray
 
 
-def reference(photons: int) -> PathTable:
+def reference(photons: int, device: str | None = None) -> PathTable:
     """A trace of the default skin that knows nothing of the stored paths, fine in radius."""
     edges = np.concatenate([[0.0], np.geomspace(pilot.FIRST_MM, pilot.LAST_MM, REFERENCE_RINGS)])
-    return baking.paths_at_every_wavelength(photons, edges, REFERENCE_SEED, Recipe().skin)
+    return baking.paths_at_every_wavelength(photons, edges, REFERENCE_SEED, Recipe().skin, ocl.choose(device))
 
 
 def reference_photons(recipe: Recipe) -> int:
@@ -74,10 +77,16 @@ def truth(needs: Needs, recipe: Recipe, traced: PathTable) -> Truth:
     lab = [color.lab(totals.spectra(exact, nm, *skins, o) @ weights) for o in needs.oxygenations]
     far = traced.radius_edges_mm
     radius_mm = np.concatenate([[needs.from_mm], far[far > needs.from_mm]])
-    table, weights = pilot.at(traced, pilot.TRUTH)
-    within = pilot.within(far, radius_mm).T
-    P = [profiles.encircled(_own(table, weights, few, o)) @ within for o in needs.oxygenations]
-    return Truth(needs, exact, skins, few, np.array(lab), radius_mm, np.array(P))
+    right = Truth(needs, traced, exact, skins, few, np.array(lab), radius_mm, np.empty(0))
+    return replace(right, encircled=_traced(right, pilot.TRUTH))
+
+
+def _traced(right: Truth, rule: str) -> np.ndarray:
+    """Encircled energy [O, Q, 3, R] of the reference at a rule's wavelengths."""
+    table, weights = pilot.at(right.traced, rule)
+    within = pilot.within(table.radius_edges_mm, right.radius_mm).T
+    own = [_own(table, weights, right.profile_skins, o) for o in right.needs.oxygenations]
+    return np.array([profiles.encircled(energy) @ within for energy in own])
 
 
 def _own(table: PathTable, weights: np.ndarray, skins, oxygenation: float) -> np.ndarray:
@@ -89,26 +98,30 @@ def _own(table: PathTable, weights: np.ndarray, skins, oxygenation: float) -> np
 
 def verify(
     needs: Needs, recipe: Recipe, right: Truth, with_profile: bool = True, bakes: int = BAKES,
-    stop: bool = False, progress: Progress = lambda stage, tally: None,
+    stop: bool = False, progress: Progress = lambda stage, tally: None, device: str | None = None,
 ) -> Measured:  # fmt: skip
     """Bake a recipe with so many seeds, its own first, and measure each; `stop` at the first that does not hold."""
-    colors, shapes, found = [], [], None
+    colors, shapes, noise, first = [], [], [], None
+    at_rule = _traced(right, recipe.wavelengths)
     for seed in range(recipe.seed, recipe.seed + bakes):
         progress(f"bake with seed {seed}", None)
-        luts = baking.bake(replace(recipe, seed=seed), exact=right.exact)
+        luts = baking.bake(replace(recipe, seed=seed), device=device, exact=right.exact)
         sets = [luts if o == luts.oxygenation else luts.expand(oxygenation=o) for o in needs.oxygenations]
+        first = first or sets
         colors.append(np.array([_color_errors(one, right, o) for o, one in enumerate(sets)]))
         shapes.append(np.array([_profile_errors(one, right, o, with_profile) for o, one in enumerate(sets)]))
-        found = found or (luts, sets)
         if stop and (_worst(colors[-1]) > needs.tolerance or _worst(shapes[-1]) > needs.ee_tolerance):
             break
-    assert found
-    luts, sets = found
+        noise.append(prediction.largest(np.array([_smooth(one, right) for one in sets]) - at_rule))
+    assert first
+    parts = {"color": _color_parts(first, right, recipe)}
+    if with_profile:
+        apart = {"quadrature": prediction.largest(at_rule - right.encircled)}
+        parts["profile"] = apart | _profile_parts(first, right) | {"noise": max(noise, default=np.nan)}
     return Measured(
         [_worst(errors) for errors in colors], float(np.max(colors)),
         [_worst(errors) for errors in shapes], float(np.max(shapes)),
-        {"color": _color_parts(sets, right, recipe), "profile": _profile_parts(sets, right, recipe, with_profile)},
-        luts.manifest["seconds"]["trace"],
+        parts, first[0].manifest["seconds"]["trace"] if "seconds" in first[0].manifest else np.nan,
     )  # fmt: skip
 
 
@@ -150,7 +163,8 @@ def _color_parts(sets: list[LutSet], right: Truth, recipe: Recipe) -> dict[str, 
         at = right.needs.oxygenations[o]
         nm, grid = rule.wavelength_nm, recipe.color
         own = color.lab(totals.spectra(right.exact, nm, *right.color_skins, at) @ rule.xyz_weights)
-        cells = totals.spectra(right.exact, nm, *(v.ravel() for v in grid.nodes()), at) @ rule.xyz_weights
+        melanin, eumelanin, hemoglobin = (v.ravel() for v in grid.nodes())
+        cells = totals.spectra(right.exact, nm, melanin, eumelanin, hemoglobin, at) @ rule.xyz_weights
         between = color.lab(grid.interpolate(cells.reshape(*grid.shape, 3), *right.color_skins))
         read = color.lab(luts.color(*right.color_skins, space="xyz"))
         for name, pair in (("quadrature", (own, right.lab[o])), ("interpolation", (between, own)),
@@ -159,18 +173,19 @@ def _color_parts(sets: list[LutSet], right: Truth, recipe: Recipe) -> dict[str, 
     return {name: max(values) for name, values in found.items()}
 
 
-def _profile_parts(sets: list[LutSet], right: Truth, recipe: Recipe, with_profile: bool) -> dict[str, float]:
-    """EE differences of nodes and rings against the bake's own paths, and of these paths: wavelengths and noise."""
-    if not with_profile:
-        return {}
-    found = {"nodes and rings": [], "wavelengths and noise": []}
-    for o, luts in enumerate(sets):
-        edges, radii = luts.paths.radius_edges_mm, right.radius_mm
-        own = profiles.encircled(
-            _own(luts.paths, luts.weights, right.profile_skins, right.needs.oxygenations[o])
-        )
-        smooth = own @ pilot.within(edges, radii).T
-        told = _told(_between(luts, right.profile_skins), edges, radii)
-        found["nodes and rings"].append(p95(np.abs(told - smooth).max(axis=-1)))
-        found["wavelengths and noise"].append(p95(np.abs(smooth - right.encircled[o]).max(axis=-1)))
-    return {name: max(values) for name, values in found.items()}
+def _smooth(luts: LutSet, right: Truth) -> np.ndarray:
+    """Encircled energy [Q, 3, R] of a set's own paths at the skins themselves."""
+    own = profiles.encircled(_own(luts.paths, luts.weights, right.profile_skins, luts.oxygenation))
+    return own @ pilot.within(luts.paths.radius_edges_mm, right.radius_mm).T
+
+
+def _profile_parts(sets: list[LutSet], right: Truth) -> dict[str, float]:
+    """EE differences of nodes and of rings, each alone, against the bake's own paths."""
+    nodes, rings = [], []
+    for luts in sets:
+        edges = luts.paths.radius_edges_mm
+        own = profiles.encircled(_own(luts.paths, luts.weights, right.profile_skins, luts.oxygenation))
+        smooth = pilot.within(edges, right.radius_mm).T
+        nodes.append((_between(luts, right.profile_skins) - own) @ smooth)
+        rings.append(_told(own, edges, right.radius_mm) - own @ smooth)
+    return {"interpolation": prediction.largest(np.array(nodes)), "rings": prediction.largest(np.array(rings))}

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 import lutgen
-from lutgen import baking, chromophores, color, config, expansion, profiles, quadrature
+from lutgen import baking, color, config, expansion, profiles, quadrature
 from lutgen.axes import Grid, default_grid
 from lutgen.charts import drawing
 from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
-from lutgen.paths import PathTable, chebyshev, interpolation_matrix
-from lutgen.solvers import path_table, totals
+from lutgen.paths import PathTable, interpolation_matrix
+from lutgen.solvers import totals
 
 SKIN = config.Recipe().skin
 """The setting of every chart here: the default recipe's."""

@@ -19,17 +19,21 @@ import numpy as np
 from scipy.optimize import nnls
 
 import lutgen
-from lutgen import baking, chromophores, config, exr, extras, pilot, quadrature
+from lutgen import baking, config, exr, extras, pilot, quadrature
 from lutgen import device as ocl
 from lutgen.axes import default_grid
 from lutgen.config import Recipe
-from lutgen.paths import PathTable, chebyshev
-from lutgen.solvers import path_table
 
 WAVELENGTHS, PHOTONS, SEED = 10, 2**22, 1000
 SCALES_MM = (0.05, 0.1, 0.2, 0.5, 1.0)
 TIERS = (("low", 8, 1), ("medium", 16, 1), ("high", 64, 1), ("reference", 64, 16))
 """Name, taps and frames added up."""
+SIZES = (
+    ((2, 2, 2), (2, 2, 2), 8), ((2, 2, 2), (2, 2, 2), 256), ((32, 16, 32), (2, 2, 2), 8), ((8, 4, 8), (8, 4, 8), 16),
+    ((2, 2, 2), (16, 4, 16), 64), ((16, 8, 16), (24, 8, 16), 32), ((2, 2, 2), (12, 4, 8), 256),
+    ((32, 16, 32), (4, 2, 3), 128),
+)  # fmt: skip
+"""Nodes of color and profile tables, and rings."""
 
 
 def recipes() -> Iterator[Recipe]:
@@ -37,15 +41,10 @@ def recipes() -> Iterator[Recipe]:
     for rule, most in (("6", 2**20), ("8", 2**20), ("12", 2**19), ("10nm", 2**17), ("5nm", 2**16)):
         for photons in (most // 64, most // 8, most):
             yield Recipe(wavelengths=rule, photons=photons)
-    for color, profile, rings in (
-        ((2, 2, 2), (2, 2, 2), 8), ((2, 2, 2), (2, 2, 2), 256), ((32, 16, 32), (2, 2, 2), 8), ((8, 4, 8), (8, 4, 8), 16),
-        ((2, 2, 2), (16, 4, 16), 64), ((16, 8, 16), (24, 8, 16), 32), ((2, 2, 2), (12, 4, 8), 256),
-        ((32, 16, 32), (4, 2, 3), 128),
-    ):  # fmt: skip
+    for color, profile, rings in SIZES:
         for rule in ("6", "12"):
-            yield Recipe(
-                photons=16_384, wavelengths=rule, rings=rings, color=default_grid(*color), profile=default_grid(*profile)
-            )
+            tables = default_grid(*color), default_grid(*profile)
+            yield Recipe(photons=16_384, wavelengths=rule, rings=rings, color=tables[0], profile=tables[1])
 
 
 def timed(recipe: Recipe, folder: Path) -> dict[str, float]:
@@ -104,7 +103,7 @@ def main() -> None:
     lines = [
         f"# What `lutgen plan` predicts from, by lutgen.data.make_plan: lutgen {facts['lutgen']}, {device.name} "
         f"({device.platform}), seed {SEED} of plan.exr ({PHOTONS} photons at each of {WAVELENGTHS} wavelengths).",
-        "# trace: rule, seconds fixed, seconds per photon per wavelength. rest: seconds of a process apart from its trace.",
+        "# trace: rule, seconds fixed, and per photon of each wavelength. rest: seconds of a process without its trace.",
         "# tier: name, taps, mm per pixel, EE difference of a disc of 6 pixels.",
         *costs(), *tiers(),
     ]  # fmt: skip
