@@ -173,7 +173,23 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--png", metavar="FILE", help="write A, B and the map of differences side by side")
     compare.set_defaults(run="lutgen.commands.compare.compare")
 
-    for command in (bake, swatch, bench, render):
+    plan = commands.add_parser("plan", help="the least model that a scene needs, its predicted error and cost")
+    plan.add_argument("--tolerance", type=float, default=0.5, help="ΔE00 of colors, 95th percentile (default: 0.5)")
+    plan.add_argument("--ee-tolerance", type=float, help="EE difference of profiles (default: a 20th of --tolerance)")
+    plan.add_argument(
+        "--tones", default="all", help="all, PRESET, melanin=LOW:HIGH, a map or a folder of maps, separated by commas"
+    )
+    plan.add_argument("--vary", metavar="NAME[,NAME...]", help="what varies at run time: melanin, oxygenation, ...")
+    plan.add_argument("--mm-per-pixel", type=float, default=0.2, help="how near the skin is seen (default: 0.2)")
+    plan.add_argument("--bytes", type=int, help="what the tables may take")
+    plan.add_argument("--seconds", type=float, help="what the bake may take")
+    plan.add_argument("--write", metavar="FILE", help="recipe to write, which `lutgen bake FILE` takes")
+    plan.add_argument("--force", action="store_true", help="replace an existing recipe")
+    plan.add_argument("--verify", action="store_true", help="bake it and set measured beside predicted errors")
+    plan.add_argument("--explain", action="store_true", help="say in five lines why each choice is the least")
+    plan.set_defaults(run="lutgen.commands.plan.plan")
+
+    for command in (bake, swatch, bench, plan, render):
         command.add_argument("--device", help="index or part of a name that `lutgen devices` lists")
     for command in commands.choices.values():
         command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

@@ -111,6 +111,26 @@ def from_dict(values: Mapping, base: Recipe | None = None) -> Recipe:
     return replace(base, **changes)
 
 
+def toml(recipe: Recipe) -> str:
+    """The recipe as TOML, every key; `load` reads the same recipe back.
+
+    >>> from_dict(tomllib.loads(toml(quality("draft")))) == quality("draft")
+    True
+    """
+    values = recipe.as_dict()
+    tables = {"skin": values.pop("skin")}
+    for name in ("color", "profile"):
+        tables |= {f"{name}.{axis}": keys for axis, keys in values.pop(name).items()}
+    lines = [_line(key, value) for key, value in values.items()]
+    for name, keys in tables.items():
+        lines += ["", f"[{name}]", *(_line(key, value) for key, value in keys.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _line(key: str, value: object) -> str:
+    return f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value!r}"
+
+
 def _table(name: str, values: Mapping, where: str | None = None) -> Mapping:
     table = values.get(name, {})
     if not isinstance(table, Mapping):

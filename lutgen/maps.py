@@ -120,6 +120,11 @@ def _melanin_of(folder: Path) -> float | None:
         return None
 
 
+def ratio(path: Path) -> np.ndarray:
+    """The ratios [rows, columns] that a chromophore map holds; its name says which."""
+    return _decoded(Path(path).stem, *read(path))
+
+
 def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:
     """What a map's texels stand for; thickness as a share of 32 mm."""
     if name in ("normal", "albedo"):

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 import lutgen
-from lutgen import baking, chromophores, color, config, expansion, profiles, quadrature
+from lutgen import baking, color, config, expansion, profiles, quadrature
 from lutgen.axes import Grid, default_grid
 from lutgen.charts import drawing
 from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
-from lutgen.paths import PathTable, chebyshev, interpolation_matrix
-from lutgen.solvers import path_table, totals
+from lutgen.paths import PathTable, interpolation_matrix
+from lutgen.solvers import totals
 
 SKIN = config.Recipe().skin
 """The setting of every chart here: the default recipe's."""
@@ -64,12 +64,7 @@ def exact_paths() -> PathTable:
 
 def traced_paths(photons: int, seed: int) -> PathTable:
     """A trace at ten Chebyshev wavelengths, each covering the absorption of all from 380 to 780 nm."""
-    (low, high), count = chromophores.WAVELENGTH_NM, TRACE_WAVELENGTHS
-    spans = (span(np.arange(low, high + 1)) for span in (chromophores.epidermis_range, chromophores.dermis_range))
-    ends_e, ends_d = ((np.full(count, least.min()), np.full(count, most.max())) for least, most in spans)
-    medium, _ = baking.skin_medium(SKIN, chebyshev(low, high, count))
-    medium = replace(medium, nu_per_mm=np.minimum(ends_e[0], ends_d[0]))
-    return path_table.trace(medium, ends_e, ends_d, _EDGES, photons, seed)
+    return baking.paths_at_every_wavelength(photons, _EDGES, seed, SKIN, wavelengths=TRACE_WAVELENGTHS)
 
 
 def at(paths: PathTable, rule: str) -> PathTable:

@@ -78,10 +78,10 @@ def walk_kernel(device: ocl.Device, life: str = "", record: int = 3):
     )
 
 
-def tabulate_kernel(device: ocl.Device, rings: int, slices: int):
+def tabulate_kernel(device: ocl.Device, rings: int, slices: int, nodes: tuple[int, int] = (NODES_E, NODES_D)):
     """The built kernel of kernels/tabulate.cl."""
     text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "tabulate")
-    sizes = {"NODES_E": NODES_E, "NODES_D": NODES_D, "RINGS": rings, "SLICES": slices}
+    sizes = {"NODES_E": nodes[0], "NODES_D": nodes[1], "RINGS": rings, "SLICES": slices}
     return ocl.kernel(device, "tabulate", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device), **sizes})
 
 
@@ -185,32 +185,34 @@ def trace(
     device: ocl.Device | None = None,
     blocks_per_launch: int | None = None,
     progress: Callable[[Tally], None] | None = None,
+    nodes: tuple[int, int] = (NODES_E, NODES_D),
 ) -> PathTable:
     """Trace all wavelengths and return their path table; photons are per wavelength.
 
     The absorption ranges, 1/mm, each (low [K], high [K]), must lie above the medium's nu. Nodes reach to 2 high - nu,
-    where the standard error is read. The last ring takes all that leaves farther out.
+    where the standard error is read. The last ring takes all that leaves farther out. `nodes` of both absorptions are
+    multiples of 16; those of a bake suit the absorptions of one wavelength.
     """
     device, tally = device or ocl.choose(), Tally()
     K, rings = len(medium.wavelength_nm), len(radius_edges_mm) - 1
     if rings & (rings - 1):
         raise InputError(f"rings = {rings}: allowed is a power of 2")
     slices = max(1, _ROWS // K)
-    tabulate = tabulate_kernel(device, rings, slices)
+    tabulate = tabulate_kernel(device, rings, slices, nodes)
     mu = [
         chebyshev(np.cbrt(low), np.cbrt(2 * high - medium.nu_per_mm), count) ** 3
-        for (low, high), count in ((epidermis_range, NODES_E), (dermis_range, NODES_D))
+        for (low, high), count in zip((epidermis_range, dermis_range), nodes, strict=True)
     ]
     rates = np.concatenate(mu, axis=1) - medium.nu_per_mm[:, None]
-    nodes, edges = ocl.buffer(device, rates.astype("f4")), ocl.buffer(device, np.asarray(radius_edges_mm, "f4"))
-    sums = np.zeros((K, slices, rings, NODES_E, NODES_D), "i8")
+    at, edges = ocl.buffer(device, rates.astype("f4")), ocl.buffer(device, np.asarray(radius_edges_mm, "f4"))
+    sums = np.zeros((K, slices, rings, *nodes), "i8")
     sum_buffer = ocl.buffer(device, sums)
-    columns = 1 if device.kind == "cpu" else NODES_D
+    columns = 1 if device.kind == "cpu" else nodes[1]
     wavelengths = np.rint(np.asarray(medium.wavelength_nm) * 1000)
     for jobs, _, bank, results in _launches(medium, photons, seed, device, blocks_per_launch, tally):
         counts = [int((jobs["wavelength"] == nm).sum()) for nm in wavelengths]
         first = ocl.buffer(device, np.concatenate([[0], np.cumsum(counts)]).astype("u4"))
-        ocl.launch(device, tabulate, (K * slices, columns), bank, results, first, nodes, edges, sum_buffer)
+        ocl.launch(device, tabulate, (K * slices, columns), bank, results, first, at, edges, sum_buffer)
         if progress:
             progress(tally)
     energy = ocl.read(device, sum_buffer, sums).sum(axis=1) * (medium.entry / _FIXED_POINT / photons)

@@ -1,0 +1,166 @@
+"""The search for recipes that hold a scene's tolerances, and the choice of the least among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from lutgen import prediction, quadrature
+from lutgen.axes import Grid
+from lutgen.config import RINGS, Recipe
+from lutgen.judging import AXES, LEEWAY, PHOTONS, SPACINGS, Judge, axis_of, middles, resized
+from lutgen.needs import Needs
+
+COLOR_MARGIN = 0.97
+"""Share of the tolerance that predicted colors may take: another 1,500 skins differ by so much in their percentile."""
+RING_SHARE = 1 / 3
+"""Share of the profile's tolerance that rings alone may take."""
+MOST_NODES = 64
+
+
+def candidates(judged: Judge) -> Iterator[Recipe]:
+    """Recipes that hold: per rule the least color table, and profile tables from coarse with many photons to fine."""
+    needs, found = judged.needs, 0
+    for rule in quadrature.NAMES:
+        if found and rule.endswith("nm"):
+            return  # they cost a multiple of the fitted rules
+        color = least_color(judged, rule)
+        if color is None:
+            continue
+        base = Recipe(wavelengths=rule, totals="anchored", color=color)
+        base = replace(base, skin=replace(base.skin, oxygenation=sum(needs.oxygenation) / 2))
+        if not judged.with_profile:
+            found += 1
+            yield replace(base, photons=PHOTONS[0], rings=RINGS[0], profile=fixed(needs))
+            continue
+        spared = []
+        for recipe in profiled(judged, base):
+            found += 1
+            spared.append(judged.rungs(recipe).get("wavelengths", np.inf) <= LEEWAY)
+            yield recipe
+        if spared and all(spared):
+            return  # fewer wavelengths do, so more are never the least
+
+
+def chosen(judged: Judge, allowed: list[Recipe]) -> Recipe:
+    """The cheapest of those with no rung down that may hold; where there is none, the one that comes nearest."""
+
+    def slack(recipe: Recipe) -> float:
+        return min(judged.rungs(recipe).values(), default=np.inf)
+
+    least = [recipe for recipe in allowed if slack(recipe) > LEEWAY]
+    return min(least, key=judged.cost) if least else max(allowed, key=slack)
+
+
+def fits(judged: Judge, recipe: Recipe) -> bool:
+    """Whether a recipe stays within the bytes and seconds allowed."""
+    spent, size = judged.cost(recipe)
+    most = judged.needs.seconds, judged.needs.bytes
+    return (most[0] is None or spent <= most[0]) and (most[1] is None or size <= most[1])
+
+
+def fixed(needs: Needs) -> Grid:
+    """A grid of one node, in the middle of the scene."""
+    return Grid(**{axis: axis_of(axis, (middle,) * 2, 1, "linear") for axis, middle in middles(needs).items()})
+
+
+def least_color(judged: Judge, rule: str) -> Grid | None:
+    """The color table with the fewest nodes whose predicted error leaves its margin, or None where none does."""
+    limit = COLOR_MARGIN * judged.needs.tolerance
+    if judged.colors.quadrature(rule) > limit:
+        return None
+
+    def error(grid: Grid) -> float:
+        return judged.colors.error(rule, grid)
+
+    grid = _spaced(judged.coarsest_color, error)
+    while error(grid) > limit:
+        grid = _finer(grid, error)
+        if grid is None:
+            return None
+    return _pruned(grid, lambda coarser: error(coarser) <= limit)
+
+
+def profiled(judged: Judge, base: Recipe) -> Iterator[Recipe]:
+    """Recipes that hold the profile's tolerance, from the coarsest table that does with many photons to finer ones."""
+    needs, rule = judged.needs, base.wavelengths
+    rings = next((n for n in RINGS if judged.profiles.rings(n) <= RING_SHARE * needs.ee_tolerance), RINGS[-1])
+
+    def error(grid: Grid) -> float:
+        return prediction.largest(judged.profiles.systematic(rule, rings, grid))
+
+    grid = _spaced(judged.coarsest_profile, error)
+    before = np.inf
+    while True:
+        if error(grid) < needs.ee_tolerance:
+            recipe = least_photons(judged, replace(base, rings=rings, profile=grid))
+            if recipe is not None:
+                yield recipe
+                # Finer tables save photons, until a rung down holds too: go on only for what is still too slow.
+                spent, rungs = judged.cost(recipe)[0], judged.rungs(recipe)
+                held = [name for name, share in rungs.items() if share <= LEEWAY]
+                if held and "photons" not in held and (spent >= before or spent <= (needs.seconds or np.inf)):
+                    return
+                before = spent
+        grid = _finer(grid, error)
+        if grid is None:
+            return
+
+
+def least_photons(judged: Judge, recipe: Recipe) -> Recipe | None:
+    """The recipe with the fewest photons with which its profiles hold in eight bakes, or None where none do."""
+    off = judged.profiles.systematic(recipe.wavelengths, recipe.rings, recipe.profile)
+
+    def holds(photons: float) -> bool:
+        found = judged.profiles.with_noise(off, recipe.wavelengths, photons)
+        return found.certain <= judged.needs.ee_tolerance
+
+    if not holds(PHOTONS[1]):
+        return None
+    if holds(PHOTONS[0]):
+        return replace(recipe, photons=PHOTONS[0])
+    low, high = np.log2(PHOTONS)
+    while high - low > 1 / 32:
+        middle = (low + high) / 2
+        low, high = (low, middle) if holds(2**middle) else (middle, high)
+    return replace(recipe, photons=int(np.ceil(2**high)))
+
+
+def _finer(grid: Grid, error: Callable[[Grid], float]) -> Grid | None:
+    """The grid with one node more, where that lowers the error most, in that axis's best spacing; None at the end."""
+    counts = {axis: getattr(grid, axis).count for axis in AXES}
+    finer = {axis: resized(grid, axis, n + 1) for axis, n in counts.items() if 1 < n < MOST_NODES}
+    if not finer:
+        return None
+    axis = min(finer, key=lambda axis: error(finer[axis]))
+    return min(_respaced(finer[axis], axis), key=error)
+
+
+def _spaced(grid: Grid, error: Callable[[Grid], float]) -> Grid:
+    """The grid in the spacings that err least, axis by axis."""
+    for axis in AXES:
+        grid = min(_respaced(grid, axis), key=error)
+    return grid
+
+
+def _respaced(grid: Grid, axis: str) -> Iterator[Grid]:
+    """The grid, then with the other spacings of an axis."""
+    yield grid
+    if getattr(grid, axis).count > 1:
+        for spacing in SPACINGS[axis]:
+            if spacing != getattr(grid, axis).spacing:
+                yield replace(grid, **{axis: replace(getattr(grid, axis), spacing=spacing)})
+
+
+def _pruned(grid: Grid, holds: Callable[[Grid], bool]) -> Grid:
+    """The grid without nodes that it can spare, one by one, whatever the spacing of their axis."""
+    for axis in AXES:
+        while (count := getattr(grid, axis).count) > 2:
+            fewer = _respaced(resized(grid, axis, count - 1), axis)
+            coarser = next((one for one in fewer if holds(one)), None)
+            if coarser is None:
+                break
+            grid = coarser
+    return grid
