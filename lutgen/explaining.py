@@ -175,6 +175,7 @@ def _had(needs: Needs) -> float | None:
     """The least factor on both tolerances, to 5 %, that some recipe fits, or None."""
 
     def fits(scale: float) -> bool:
+        """Whether any recipe keeps both tolerances times a factor."""
         judged = judging.judge(_scaled(needs, scale))
         return any(search.fits(judged, recipe) for recipe in search.candidates(judged))
 

@@ -49,6 +49,7 @@ class Needs:
 
     def __post_init__(self):
         def put(name: str, value: object) -> None:
+            """Set a field of the frozen record."""
             object.__setattr__(self, name, value)
 
         for name in VARIABLE:

@@ -48,6 +48,7 @@ def chosen(judged: Judge, allowed: list[Recipe]) -> Recipe:
     """The cheapest of those with no rung down that may hold; where there is none, the one that comes nearest."""
 
     def slack(recipe: Recipe) -> float:
+        """How far the nearest rung down misses its tolerance."""
         return min(judged.rungs(recipe).values(), default=np.inf)
 
     least = [recipe for recipe in allowed if slack(recipe) > LEEWAY]
@@ -73,6 +74,7 @@ def least_color(judged: Judge, rule: str) -> Grid | None:
         return None
 
     def error(grid: Grid) -> float:
+        """The systematic error of a grid."""
         return judged.colors.error(rule, grid)
 
     grid = _spaced(judged.coarsest_color, error)
@@ -89,6 +91,7 @@ def profiled(judged: Judge, base: Recipe) -> Iterator[Recipe]:
     rings = next((n for n in RINGS if judged.profiles.rings(n) <= RING_SHARE * needs.ee_tolerance), RINGS[-1])
 
     def error(grid: Grid) -> float:
+        """The systematic error of a grid."""
         return prediction.largest(judged.profiles.systematic(rule, rings, grid))
 
     grid = _spaced(judged.coarsest_profile, error)
@@ -114,6 +117,7 @@ def least_photons(judged: Judge, recipe: Recipe) -> Recipe | None:
     off = judged.profiles.systematic(recipe.wavelengths, recipe.rings, recipe.profile)
 
     def holds(photons: float) -> bool:
+        """Whether profiles of that many photons keep their tolerance."""
         found = judged.profiles.with_noise(off, recipe.wavelengths, photons)
         return found.certain <= judged.needs.ee_tolerance
 

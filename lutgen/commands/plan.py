@@ -103,6 +103,7 @@ def _verified(found: Plan, progress: Progress, device: str | None) -> dict:
 
 def _compared(found: Plan, measured: dict) -> list[str]:
     def both(error: dict[str, float], parts: dict[str, float]) -> str:
+        """Measured parts, the predicted in brackets."""
         return ", ".join(f"{name} {value:.2g} ({error[name]:.2g})" for name, value in parts.items() if name in error)
 
     color, profile = found.color_error, found.profile_error
