@@ -45,7 +45,7 @@ def test_all_of_the_lut_comes_back_as_far_as_color_tells(luts, melanin, seed):
     to, p95 .19 from adding-doubling) and by more than 8 bits do, where it has 8: then 95 % lie within 5 %. Measured
     without bits: melanin .6 %, blood 4.2 % on the darkest and 1.3 % elsewhere. Through 8 bits no blood is told so well,
     but none is lost: its median stays."""
-    m, h = between(*melanin, seed), between(0.001, 0.1, seed + 40)
+    m, h = between(melanin[0], melanin[1], seed), between(0.001, 0.1, seed + 40)
     exact = luts.color(m, 0.7, h)
     coded = color.decode_srgb(np.rint(255 * color.encode_srgb(exact)) / 255)
     more = [luts.color(np.minimum(1.05 * m, 0.5), 0.7, h), luts.color(m, 0.7, np.minimum(1.05 * h, 0.1))]
