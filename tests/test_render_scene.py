@@ -106,7 +106,8 @@ def still(device, epidermis_mm: float, dermis_mm: float):
     """A walk that leaves where it entered, after paths of given lengths."""
     import pyopencl
 
-    def walk(entries, exits, places: int, block: int) -> int:
+    def walk(entries, exits, part: queues.Part) -> int:
+        places = (part.end - part.begin) * part.samples
         begun = ocl.read(device, entries, np.zeros(places, queues.ENTRY))
         ended = np.zeros(places, queues.EXIT)
         ended["position"], ended["normal"] = begun["position"], begun["normal"]
