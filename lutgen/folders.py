@@ -1,4 +1,4 @@
-"""Folders that are there whole or not at all: written beside the target, synced, renamed."""
+"""Folders and files that are there whole or not at all: written beside the target, synced, renamed."""
 
 from __future__ import annotations
 
@@ -40,6 +40,24 @@ def whole(out: str | Path, force: bool = False, mark: str = MARK) -> Iterator[Pa
             old.rename(target)
         for leftover in (partial, old):
             shutil.rmtree(leftover, ignore_errors=True)
+
+
+@contextmanager
+def whole_file(name: str, out: str | Path) -> Iterator[Path]:
+    """A file to write that becomes `out` when the block ends well; else `out` is as it was.
+
+    Raises InputError, which names the option `name`, where `out` cannot be written, MachineError on a full disk.
+    """
+    target = Path(os.path.realpath(out))
+    partial = target.with_name(f".{target.name[:150]}.{os.getpid()}-{secrets.token_hex(4)}{target.suffix}")
+    try:
+        yield partial
+        _sync(partial)
+        partial.replace(target)
+    except OSError as error:
+        raise cannot_write(name, out, error) from error
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def check_target(out: str | Path, force: bool, mark: str = MARK) -> Path:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr, scene, subject
+from lutgen import exr, folders, scene, subject
 from lutgen.errors import InputError, cannot_write
 from lutgen.lutset import LutSet
 from lutgen.maps import Maps
@@ -44,10 +44,8 @@ def screenshot(stage: stages.Stage, look: Look, path: Path | str) -> None:
     passes.draw(stage, look)
     light, skin = passes.radiance(stage)
     channels = exr.rgb(light.astype("f4")) | {"mask": skin.astype("f4")}
-    try:
-        exr.write(Path(path), [exr.Part("view", channels, {"look": asdict(look), "size": list(stage.size)})])
-    except OSError as error:
-        raise cannot_write("picture", path, error) from error
+    with folders.whole_file("picture", path) as partial:
+        exr.write(partial, [exr.Part("view", channels, {"look": asdict(look), "size": list(stage.size)})])
 
 
 def sheet(stage: stages.Stage, look: Look, columns: int = 3, progress: Callable = lambda name: None) -> np.ndarray:

@@ -24,7 +24,7 @@ VIEWS = {
 }
 """The default look at 1.3 mm per pixel of a picture of 192 x 192, and the shadow of the nose at 0.13."""
 _MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.13}
-QUICK = {"tiers": ("off", "medium", "high"), "tones": ("light", "dark"), "side": 96, "samples": 32, "rounds": 1,
+QUICK = {"tiers": ("off", "medium", "high"), "tones": ("light",), "side": 96, "samples": 32, "rounds": 1,
          "timed": (320, 180)}  # fmt: skip
 FULL = {"tiers": scene.TIERS, "tones": ("very-light", "light", "intermediate", "tan", "brown", "dark"), "side": 192,
         "samples": 64, "rounds": 3, "timed": (640, 360)}  # fmt: skip

@@ -6,8 +6,8 @@ from argparse import Namespace
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from lutgen import folders
 from lutgen.commands import Outcome
-from lutgen.errors import cannot_write
 
 if TYPE_CHECKING:
     from lutgen.render.difference import Difference
@@ -20,10 +20,8 @@ def compare(options: Namespace) -> Outcome:
     a, b = pictures.read(options.a), pictures.read(options.b)
     found = difference.compare(a, b)
     if options.png is not None:
-        try:
-            beside.draw(a, b, found).save(options.png, format="PNG")
-        except OSError as error:
-            raise cannot_write("png", options.png, error) from error
+        with folders.whole_file("png", options.png) as partial:
+            beside.draw(a, b, found).save(partial, format="PNG")
     names = "mean", "median", "p95"
     result = {
         "a": options.a, "b": options.b, "size": list(a.acescg.shape[1::-1]), "boxes": found.boxes,

@@ -8,14 +8,13 @@ square.RR ... .GB (means of products of samples), from which a later run goes on
 from __future__ import annotations
 
 import os
-import secrets
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from lutgen import color, exr
-from lutgen.errors import InputError, cannot_write
+from lutgen import color, exr, folders
+from lutgen.errors import InputError
 
 PRODUCTS = ("RR", "GG", "BB", "RG", "RB", "GB")
 MOMENTS = 4 + len(PRODUCTS)
@@ -96,20 +95,8 @@ def write(made: Picture, path: Path) -> None:
     channels |= {f"square.{name}": made.sums[..., 4 + i] / n for i, name in enumerate(PRODUCTS)}
     facts = {"render": made.facts | {"samples": made.samples, "estimates": made.estimates, "group": made.group}}
     part = exr.Part("render", {name: values.astype("f4") for name, values in channels.items()}, facts)
-    target = Path(os.path.realpath(path))
-    partial = target.with_name(f".{target.name[:150]}.{os.getpid()}-{secrets.token_hex(4)}.exr")
-    try:
+    with folders.whole_file("out", path) as partial:
         exr.write(partial, [part])
-        handle = os.open(partial, os.O_RDWR)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-        partial.replace(target)
-    except OSError as error:
-        raise cannot_write("out", path, error) from error
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def read(path: Path) -> Picture:
