@@ -110,7 +110,8 @@ def line(row: Row) -> str:
     """A row of the table."""
     return (
         f"| {row.tones} | {row.vary} | {row.tolerance:g} | {row.ee_tolerance:g} | {row.mm_per_pixel:g} | "
-        f"{row.recipe} | {row.seconds:.2f} | {row.color[0]:.3g} {row.color[1]:.3g} | {row.profile[0]:.2g} {row.profile[1]:.2g} | "
+        f"{row.recipe} | {row.seconds:.2f} | {row.color[0]:.3g} {row.color[1]:.3g} | "
+        f"{row.profile[0]:.2g} {row.profile[1]:.2g} | "
         f"{'yes' if row.holds else 'NO'} | {'yes' if row.within_2 else 'NO'} | "
         f"{', '.join(row.held_below) or 'none'} of {row.rungs} |"
     )
