@@ -1,9 +1,9 @@
 """The least model a scene needs: what is predicted is what is measured, and no choice is more than it has to be."""
 
+import itertools
 import json
 import os
 from dataclasses import replace
-from itertools import pairwise
 
 import bench_plan
 import numpy as np
@@ -125,7 +125,7 @@ def test_a_wider_pixel_never_asks_more_rings_or_taps():
     plans = [planning.plan(scene("light", mm_per_pixel=mm)) for mm in (0.02, 0.1, 0.4, 1.0, 3.0, 20.0)]
     tiers = ["off", *(tier.name for tier in costs.tiers())]
     assert plans[0].recipe.rings > plans[-1].recipe.rings
-    for narrow, wide in pairwise(plans):
+    for narrow, wide in itertools.pairwise(plans):
         assert wide.recipe.rings <= narrow.recipe.rings
         assert wide.viewer.taps <= narrow.viewer.taps
         assert tiers.index(wide.viewer.tier) <= tiers.index(narrow.viewer.tier)
