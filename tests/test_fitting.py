@@ -1,5 +1,7 @@
 """Fits: skins come back from their own spectra, sigma covers noise, and what the data cannot tell is said."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares as scipy_least_squares
@@ -123,16 +125,18 @@ def test_more_parameters_leave_less(exact, name):
 
 
 def test_scipy_finds_no_better_skin(exact):
-    """Trust-region descents from 5 random points each end no lower."""
-    rng = np.random.default_rng(2)
-    for name in ("very-light", "dark"):
-        data = measured.spectrum(NM, misfit(exact, name))
-        task = nearest.problem(data, NAMES, lutgen.preset(name), fitting.SPECULAR)
+    """Trust-region descents from four points end no lower, also where one start of ours, or two, would end too high."""
+    rough = [
+        (lutgen.Skin(0.42, 0.473, 0.0474, 0.00978), 61.2, 5.33),
+        (lutgen.Skin(0.373, 1, 0.0234, 0.711), 35.9, 3.62),
+    ]
+    data = [np.clip(of(exact, skin) * (1 + 0.2 * np.sin((NM - 400) / period + at)), 0, 1) for skin, period, at in rough]
+    for values in (*data, misfit(exact, "very-light"), misfit(exact, "dark")):
+        task = nearest.problem(measured.spectrum(NM, values), NAMES, lutgen.preset("light"))
         ours = float((task.residual(nearest.solve(task)[None]) ** 2).sum())
-        for start in rng.uniform(task.low, task.high, (5, 4)):
-            other = scipy_least_squares(
-                lambda q, task=task: task.residual(q[None])[0], start, bounds=(task.low, task.high)
-            )
+        for h, e in product((0.1, 0.9), repeat=2):
+            start, bounds = task.low + np.array([0.5, h, 0.5, e]) * (task.high - task.low), (task.low, task.high)
+            other = scipy_least_squares(lambda q, t=task: t.residual(q[None])[0], start, bounds=bounds)
             assert ours <= 2 * other.cost * (1 + 1e-6)
 
 
