@@ -105,7 +105,11 @@ def _parser() -> argparse.ArgumentParser:
     sheet.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
     sheet.set_defaults(run="lutgen.commands.pictures.sheet")
 
-    render.add_argument("--walk", default="flat", help="flat: as if the skin were flat where light enters (default)")
+    render.add_argument(
+        "--walk", default="flat",
+        help="flat: as if the skin were flat where light enters (default); flat-full: the same without its tables; "
+        "mesh: inside the head, which must be closed",
+    )  # fmt: skip
     render.add_argument("--spp", type=int, help="samples a pixel (default: 256 where neither time nor noise is given)")
     render.add_argument("--time", metavar="60s", help="stop after so long: 60s, 5m, 1h")
     render.add_argument("--noise", type=float, help="stop where a pixel's noise is this ΔE00 on average")

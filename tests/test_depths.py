@@ -53,24 +53,37 @@ def test_depths_of_a_sphere_are_its_radius_less_the_distance_to_its_middle():
     assert np.all(found[deep] <= exact[deep] + 1e-4)  # a bound never promises more room than there is
 
 
+def signs(points: np.ndarray, positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Whether points [N] are inside."""
+    one = np.zeros((1, 1, 1), "f4")
+    none = distance.Depths(np.zeros(3), 1.0, 1.0, one, one.astype("i4") - 1, one.astype("i2"))
+    return depths_at(points, positions, triangles, none)[0] > 0
+
+
 def test_inside_is_inside_however_the_mesh_is_turned():
-    """A thin box at 20 angles, with points around its edges and corners: no ray is fooled by an edge that it meets."""
+    """A thin box at 20 angles, with points around its edges and corners."""
     rng = np.random.default_rng(5)
-    device = ocl.choose()
     box = trimesh.creation.box((6.0, 3.0, 1.0))
     for _ in range(20):
         turn = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
         positions, triangles = closed.surface(np.asarray(box.vertices) @ turn.T, np.asarray(box.faces))[:2]
         local = rng.choice([-1.0, 0.0, 1.0], (512, 3)) * (3, 1.5, 0.5) + rng.choice([-1e-2, 1e-2], (512, 3))
         inside = np.all(np.abs(local) < (3, 1.5, 0.5), axis=1)
-        points = ocl.buffer(device, (local @ turn.T).astype("f4"))
-        exact = np.empty(512, "f4")
-        out = ocl.buffer(device, exact), ocl.buffer(device, 16 * 512)
-        one = np.zeros((1, 1, 1), "f4")
-        none = distance.Depths(np.zeros(3), 1.0, 1.0, one, one.astype("i4") - 1, one.astype("i2"))
-        ocl.launch(device, distance.kernel(device, "depths"), (512,), points, *out, *distance.buffers(device, none),
-                   *distance.tree_buffers(device, positions, triangles))  # fmt: skip
-        assert np.array_equal(ocl.read(device, out[0], exact) > 0, inside)
+        assert np.array_equal(signs(local @ turn.T, positions, triangles), inside)
+
+
+def test_no_ray_is_fooled_by_the_edge_that_it_meets():
+    """Points from which the first ray of kernels/distance.cl runs into an edge, or into a corner, of an octahedron."""
+    octahedron = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    faces = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]], "i4")
+    rng = np.random.default_rng(6)
+    ends = octahedron[faces[rng.integers(0, 8, 20_000)][:, :2]]
+    share = rng.choice([0.0, 0.25, 0.5, 1.0], 20_000)[:, None]
+    points = ends[:, 0] * share + ends[:, 1] * (1 - share)
+    points -= np.array([0.5377, 0.7123, 0.4511]) * rng.uniform(0.02, 2.5, 20_000)[:, None]
+    size = np.abs(points).sum(axis=1)
+    clear = np.abs(size - 1) > 1e-3
+    assert np.array_equal(signs(points[clear], octahedron, faces), size[clear] < 1)
 
 
 def test_depths_are_kept_and_come_back_the_same(monkeypatch, tmp_path):

@@ -161,6 +161,23 @@ def test_a_lossless_sphere_loses_nothing_and_its_mean_path_is_that_of_its_volume
     assert abs(path.mean() - exact) < 4 * path.std() / np.sqrt(count) + 0.003 * exact  # .3 %: see kernels/anchors.cl
 
 
+def test_clear_skin_is_a_pane_of_glass():
+    """Without scattering light crosses a slab straight, bends back as it leaves, and its path is the chord."""
+    cosine = 0.8
+    given = entries(4096, cosine=cosine)
+    clear = Medium(*(np.array([v]) for v in (550.0, 1e-4, G, 1e-6)), epidermis_mm=EPIDERMIS, n=INDEX)
+    exits, _ = walked(given, clear, slab(1.0))
+    down = exits["normal"][:, 2] < -0.5  # some are mirrored inside, once or more often
+    first = down & (exits["path_epidermis_mm"] + exits["path_dermis_mm"] < 2)
+    assert first.sum() > 3500
+    chord, along = 1 / cosine, given["direction"][first, :2]
+    assert np.abs(exits["path_epidermis_mm"][first] - 2 * EPIDERMIS / cosine).max() < 2e-3
+    assert np.abs(exits["path_dermis_mm"][first] - (chord - 2 * EPIDERMIS / cosine)).max() < 2e-3
+    assert np.abs(exits["position"][first, :2] - chord * along).max() < 2e-3
+    assert np.abs(exits["direction"][first, :2] - INDEX * along).max() < 1e-4
+    assert np.abs(exits["direction"][first, 2] + np.sqrt(1 - INDEX**2 * (1 - cosine**2))).max() < 1e-4
+
+
 def test_light_that_comes_in_at_60_degrees_leaves_as_adding_doubling_says():
     """The ratio to normal incidence on dark skin (PHYSICS: .91 to 1.28) at the quadrature's node nearest 60 degrees."""
     layers = lutgen.layers(lutgen.preset("dark"), 450.0)

@@ -9,6 +9,7 @@ from rendering import BARE, EVEN, PHOTONS, SKY, SUN, ball, mean, opened, plane, 
 from test_render_laws import from_paths, skin_of
 
 from lutgen import lighting
+from lutgen.cli import main
 from lutgen.errors import InputError
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
@@ -79,6 +80,31 @@ def test_thin_skin_lets_light_through_by_the_walk_inside_only():
 def test_a_mesh_with_holes_is_refused():
     with pytest.raises(InputError, match="hole.*--walk flat"):
         walks.WALKS["mesh"](opened(plane(), SUN), 0)
+
+
+def test_the_command_says_what_a_walk_inside_needs(tmp_path, capsys):
+    """Status 2 and one line for a mesh with a hole in its face; nothing is written."""
+    made = ball(120.0, 24)
+    front = made.positions_mm[made.triangles][:, :, 2].min(axis=1) > 110
+    trimesh.Trimesh(made.positions_mm, made.triangles[~front], process=False).export(tmp_path / "open.obj")
+    out = tmp_path / "open.exr"
+    command = [
+        "render",
+        "--mesh",
+        str(tmp_path / "open.obj"),
+        "--mm-per-unit",
+        "1",
+        "--walk",
+        "mesh",
+        "--out",
+        str(out),
+    ]
+    assert main([*command, "--size", "16x16", "--spp", "8"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert "1 hole, " in said
+    assert "close them in your editor, or use --walk flat" in said
+    assert "\n" not in said
+    assert not out.exists()
 
 
 def test_the_same_seed_makes_the_same_picture():

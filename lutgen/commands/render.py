@@ -59,6 +59,7 @@ def render(options: Namespace) -> Outcome:
         opened = _timed(seconds, "tree", lambda: stage.open_stage(
             device, luts, shape, given, look, size, around, seed))  # fmt: skip
         walk = _timed(seconds, "exits", lambda: walks.WALKS[options.walk](opened, seed))
+        notes = (*notes, *walk.facts.get("notes", ()))
         facts = {"recipe": recipe, "walk": walk.facts, "notes": list(notes), "device": device.name}
         start = picture.empty(size, walk.group, facts) if before is None else before
 
@@ -103,6 +104,12 @@ def _report(options, made, tally, noise: float, walk, seconds: dict, notes: tupl
         f"exits without a surface {100 * counts.get('MISSES', 0) / probes:.2g} %, on one that faces away "
         f"{100 * counts.get('REJECTED', 0) / probes:.2g} %: lit where they entered",
     ]
+    photons = walk.facts.get("photons", {})
+    if photons.get("lost") or photons.get("unfinished"):
+        lines.append(
+            f"of {photons['entered']} walks {photons['lost']} were lost at folds of the mesh, {photons['unfinished']} "
+            "given up for their length"
+        )
     if counts.get("BROKEN"):
         lines.append(f"{counts['BROKEN']} samples were not finite and were left out")
     if not made.mask.any():
