@@ -47,6 +47,13 @@ inline float3 gathered(const scene_t *s, const surface_t *there, float3 color, s
     return light;
 }
 
+// Whether light that may be so strong is worth a ray, and how often: faint light is looked for the more rarely, and
+// then counts as often as it was left out.
+inline float worth(const scene_t *s, float strength, rng_t *rng) {
+    float chance = fmin(strength / s->view->faint, 1.0f);
+    return next_uniform(rng) < chance ? 1.0f / chance : 0.0f;
+}
+
 // Radiance that the surface reflects toward -d; a mirrored ray that meets the head becomes another start.
 inline float3 reflected(const scene_t *s, const surface_t *here, float3 d, start_t *mirrored, rng_t *rng, uint *tally) {
     const float3 n = normalize(here->relief), v = -d, sun = toward_sun(s, rng);
@@ -54,11 +61,17 @@ inline float3 reflected(const scene_t *s, const surface_t *here, float3 d, start
     mirrored->hit.triangle = -1;
     if (here->gloss <= 0.0f) return light;
     if (s->view->sunny && dot(n, sun) > 0.0f && dot(here->smooth, sun) > 0.0f) {
-        tally[SUN_RAYS]++;
-        if (!shaded(s, start(here), sun)) light = view3(s->view->sun_color) * lobes(s, here, n, v, sun);
+        float3 shine = view3(s->view->sun_color) * lobes(s, here, n, v, sun);
+        float counts = worth(s, here->gloss * shine.y, rng);
+        if (counts > 0.0f) {
+            tally[SUN_RAYS]++;
+            if (!shaded(s, start(here), sun)) light = counts * shine;
+        }
     }
     float weight = 0.0f;
     mirrored->direction = toward_reflection(s, here, n, v, rng, &weight);
+    if (s->view->environment > 0.0f)
+        weight *= worth(s, here->gloss * weight * s->view->environment * sky_strength(s, mirrored->direction), rng);
     if (s->view->environment > 0.0f && weight > 0.0f) {
         tally[SKY_RAYS]++;
         mirrored->hit = nearest(s, start(here), mirrored->direction);

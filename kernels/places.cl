@@ -13,7 +13,7 @@ inline surface_t exit_at(const scene_t *s, const surface_t *here, float3 offset,
         tally[MISSES]++;
         return *here;
     }
-    surface_t there = surface_at(s, hit);
+    surface_t there = skin_at(s, hit, false);
     if (dot(there.smooth, n) > 0.0f && dot(there.geometric, n) > 0.0f) return there;
     tally[REJECTED]++;
     return *here;

@@ -96,8 +96,8 @@ inline float rougher(float roughness, float variance) {
     return fmin(sqrt(sqrt(square * square + variance)), 1.0f);
 }
 
-// All that is known of the skin at a hit (viewer/shaders/surface.frag.glsl).
-inline surface_t surface_at(const scene_t *s, hit_t hit) {
+// The skin at a hit (viewer/shaders/surface.frag.glsl); without `seen` only what matters where light enters.
+inline surface_t skin_at(const scene_t *s, hit_t hit, bool seen) {
     __global const view_t *view = s->view;
     __global const int *corner = s->corners + 3 * hit.triangle;
     const float8 a = s->vertices[corner[0]], b = s->vertices[corner[1]], c = s->vertices[corner[2]];
@@ -126,15 +126,18 @@ inline surface_t surface_at(const scene_t *s, hit_t hit) {
         here.relief -= strength * slope.xyz;
         unseen += strength * strength * slope.w;
     }
+    here.skin = view3(view->chromophores) * read_map(s->chromophore_map, view->chromophore_size, at).xyz;
+    here.skin = clamp(here.skin, view3(view->chromophores_low), view3(view->chromophores_high));
+    if (!seen) return here;
     float4 made = read_map(s->surface_map, view->surface_size, at);
     here.rough = rougher(clamp(view->roughness * made.x, 0.15f, 1.0f), unseen);
     here.rough2 = rougher(clamp(view->roughness * made.x * SECOND_LOBE, 0.1f, 1.0f), unseen);
     here.gloss = view->specular * made.y;
-    here.skin = view3(view->chromophores) * read_map(s->chromophore_map, view->chromophore_size, at).xyz;
-    here.skin = clamp(here.skin, view3(view->chromophores_low), view3(view->chromophores_high));
     here.detail = read_map(s->detail_map, view->detail_size, at).xyz;
     return here;
 }
+
+inline surface_t surface_at(const scene_t *s, hit_t hit) { return skin_at(s, hit, true); }
 
 // Absorption of epidermis and dermis above the life rate at wavelength k, 1/mm (lutgen/chromophores.py).
 inline float2 absorption(const scene_t *s, int k, float3 skin) {

@@ -77,7 +77,7 @@ inline surface_t left_at(const scene_t *s, const surface_t *here, float3 p, floa
         tally[MISSES]++;
         return *here;
     }
-    surface_t there = surface_at(s, hit);
+    surface_t there = skin_at(s, hit, false);
     if (dot(there.smooth, n) > 0.0f) return there;
     tally[REJECTED]++;
     return *here;

@@ -49,7 +49,7 @@ def render(options: Namespace) -> Outcome:
     recipe = {
         "lutgen": version("lutgen"), "walk": options.walk, "size": list(size), "seed": seed, "kernels": _kernels(),
         "look": {name: value for name, value in asdict(look).items() if name not in _NOT_SEEN},
-        "luts": luts.manifest["trace"] | {"recipe": luts.manifest["recipe"]},
+        "luts": {name: luts.manifest[name] for name in ("trace", "recipe", "extra_absorbers_per_mm")},
         "head": _hash(shape.positions_mm, shape.normals, shape.uv, shape.triangles), "maps": _hash_of(given),
         "environment": "studio" if around is None else _hash(around),
     }  # fmt: skip

@@ -28,6 +28,8 @@ BASE = "lanes", "rng", "trace", "frame", "scene", "light", "paths", "moments"
 TALLIES = ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS", "HITS", "BACKS", "MISSES", "REJECTED", "BOUNCES", "BROKEN")
 """What kernels count: rays by kind (the first four); camera rays that met skin, and those on back faces; exits without
 a surface, or on one that faces away; paths from skin to skin; samples that were not finite."""
+FAINT = 0.02
+"""Reflected light below this share of the scene's is not looked for with every sample."""
 PIXELS = {"cpu": 64, "gpu": 1}
 """Pixels that one work-item takes in turn."""
 CANDIDATES, STRIDE, SKY_CELLS, LEAST_SKY = 4, 1, 64, 0.25
@@ -43,7 +45,7 @@ VIEW = np.dtype(
     + [(f"{name}_size", "i4", (2,)) for name in PLAIN]
     + [
         (name, "f4")
-        for name in ("sun_spread", "environment", "roughness", "specular", "bumps", "entry", "pore_side_mm")
+        for name in ("sun_spread", "environment", "faint", "roughness", "specular", "bumps", "entry", "pore_side_mm")
     ]
     + [(name, "i4") for name in ("columns", "rows", "pore_texels", "environment_rows", "sunny", "bounces")]
     + [("seed", "u4"), ("exit_means", "f4", (_EXIT_MEANS,))]
@@ -168,14 +170,14 @@ def _surroundings(around: np.ndarray | None) -> np.ndarray:
 
 
 def _sky(radiance: np.ndarray) -> np.ndarray:
-    """Mean luminance [64, 64] of the surroundings by cells of an octahedron, unfolded with the sky in the middle."""
+    """Mean radiance [64, 64] of the surroundings by cells of an octahedron, unfolded with the sky in the middle."""
     finer = np.repeat(np.repeat(radiance, k := -(-STUDIO_ROWS // len(radiance)), axis=0), k, axis=1)
     ways, angle = environment.directions(len(finer))
     p = ways / np.abs(ways).sum(axis=-1, keepdims=True)
     x, z = (np.where(p[..., 1] < 0, np.copysign(1 - np.abs(p[..., 2 - i]), p[..., i]), p[..., i]) for i in (0, 2))
     column, row = (np.minimum((0.5 + 0.5 * v) * SKY_CELLS, SKY_CELLS - 1).astype(int) for v in (x, z))
     cell = (row * SKY_CELLS + column).ravel()
-    light = np.bincount(cell, (finer.sum(axis=-1) * angle).ravel(), SKY_CELLS**2)
+    light = np.bincount(cell, (finer.mean(axis=-1) * angle).ravel(), SKY_CELLS**2)
     mean = light / np.maximum(np.bincount(cell, angle.ravel(), SKY_CELLS**2), 1e-9)
     return np.maximum(mean, max(LEAST_SKY * mean.mean(), 1e-20)).astype("f4")
 
@@ -195,6 +197,7 @@ def _view(
         "chromophores": [getattr(look, a.name) for a in axes], "chromophores_low": [a.low for a in axes],
         "chromophores_high": [a.high for a in axes],
         "turn": (np.cos(turn), np.sin(turn)), "environment": look.environment if radiance.any() else 0.0,
+        "faint": FAINT * (look.light / np.pi + look.environment * float(radiance[..., :3].mean())) + 1e-20,
         "roughness": look.roughness, "specular": look.specular, "bumps": look.bumps, "entry": look.entry,
         "pore_side_mm": pores.SIDE_MM, "columns": size[0], "rows": size[1], "pore_texels": pores.TEXELS,
         "environment_rows": len(radiance), "sunny": look.light > 0, "bounces": bounces, "seed": seed,
