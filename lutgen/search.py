@@ -17,15 +17,17 @@ COLOR_MARGIN = 0.97
 """Share of the tolerance that predicted colors may take: another 1,500 skins differ by so much in their percentile."""
 RING_SHARE = 1 / 3
 """Share of the profile's tolerance that rings alone may take."""
+NEGLIGIBLE = 0.1
 MOST_NODES = 64
 
 
 def candidates(judged: Judge) -> Iterator[Recipe]:
     """Recipes that hold: per rule the least color table, and profile tables from coarse with many photons to fine."""
-    needs, found = judged.needs, 0
+    needs, found, fewer = judged.needs, 0, ""
     for rule in quadrature.NAMES:
-        if found and rule.endswith("nm"):
-            return  # they cost a multiple of the fitted rules
+        if found and (rule.endswith("nm") or _negligible(judged, fewer)):
+            return  # regular rules cost a multiple of the fitted ones
+        fewer = rule
         color = least_color(judged, rule)
         if color is None:
             continue
@@ -35,24 +37,33 @@ def candidates(judged: Judge) -> Iterator[Recipe]:
             found += 1
             yield replace(base, photons=PHOTONS[0], rings=RINGS[0], profile=fixed(needs))
             continue
-        spared = []
-        for recipe in profiled(judged, base):
-            found += 1
-            spared.append(judged.rungs(recipe).get("wavelengths", np.inf) <= LEEWAY)
-            yield recipe
-        if spared and all(spared):
+        rings = enough_rings(judged)
+        of_rule = list(profiled(judged, base, rings))
+        if of_rule and max(slack(judged, recipe) for recipe in of_rule) <= LEEWAY and rings < RINGS[-1]:
+            of_rule += profiled(judged, base, 2 * rings)  # what rings no longer err by frees photons and nodes
+        found += len(of_rule)
+        yield from of_rule
+        if of_rule and all(judged.rungs(recipe).get("wavelengths", np.inf) <= LEEWAY for recipe in of_rule):
             return  # fewer wavelengths do, so more are never the least
+
+
+def _negligible(judged: Judge, rule: str) -> bool:
+    """Whether a rule errs so little that more wavelengths are never the least."""
+    off = judged.colors.quadrature(rule) / judged.needs.tolerance
+    if judged.with_profile:
+        off = max(off, judged.profiles.quadrature(rule) / judged.needs.ee_tolerance)
+    return off < NEGLIGIBLE
 
 
 def chosen(judged: Judge, allowed: list[Recipe]) -> Recipe:
     """The cheapest of those with no rung down that may hold; where there is none, the one that comes nearest."""
+    least = [recipe for recipe in allowed if slack(judged, recipe) > LEEWAY]
+    return min(least, key=judged.cost) if least else max(allowed, key=lambda recipe: slack(judged, recipe))
 
-    def slack(recipe: Recipe) -> float:
-        """How far the nearest rung down misses its tolerance."""
-        return min(judged.rungs(recipe).values(), default=np.inf)
 
-    least = [recipe for recipe in allowed if slack(recipe) > LEEWAY]
-    return min(least, key=judged.cost) if least else max(allowed, key=slack)
+def slack(judged: Judge, recipe: Recipe) -> float:
+    """The share of the tolerance that the best rung down is likely to take: above 1 it does not hold."""
+    return min(judged.rungs(recipe).values(), default=np.inf)
 
 
 def fits(judged: Judge, recipe: Recipe) -> bool:
@@ -74,7 +85,6 @@ def least_color(judged: Judge, rule: str) -> Grid | None:
         return None
 
     def error(grid: Grid) -> float:
-        """The systematic error of a grid."""
         return judged.colors.error(rule, grid)
 
     grid = _spaced(judged.coarsest_color, error)
@@ -85,13 +95,17 @@ def least_color(judged: Judge, rule: str) -> Grid | None:
     return _pruned(grid, lambda coarser: error(coarser) <= limit)
 
 
-def profiled(judged: Judge, base: Recipe) -> Iterator[Recipe]:
+def enough_rings(judged: Judge) -> int:
+    """The fewest rings that take but a share of the profile's tolerance."""
+    most = RING_SHARE * judged.needs.ee_tolerance
+    return next((n for n in RINGS if judged.profiles.rings(n) <= most), RINGS[-1])
+
+
+def profiled(judged: Judge, base: Recipe, rings: int) -> Iterator[Recipe]:
     """Recipes that hold the profile's tolerance, from the coarsest table that does with many photons to finer ones."""
     needs, rule = judged.needs, base.wavelengths
-    rings = next((n for n in RINGS if judged.profiles.rings(n) <= RING_SHARE * needs.ee_tolerance), RINGS[-1])
 
     def error(grid: Grid) -> float:
-        """The systematic error of a grid."""
         return prediction.largest(judged.profiles.systematic(rule, rings, grid))
 
     grid = _spaced(judged.coarsest_profile, error)
@@ -117,7 +131,6 @@ def least_photons(judged: Judge, recipe: Recipe) -> Recipe | None:
     off = judged.profiles.systematic(recipe.wavelengths, recipe.rings, recipe.profile)
 
     def holds(photons: float) -> bool:
-        """Whether profiles of that many photons keep their tolerance."""
         found = judged.profiles.with_noise(off, recipe.wavelengths, photons)
         return found.certain <= judged.needs.ee_tolerance
 

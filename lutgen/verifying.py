@@ -101,13 +101,14 @@ def verify(
     stop: bool = False, progress: Progress = lambda stage, tally: None, device: str | None = None,
 ) -> Measured:  # fmt: skip
     """Bake a recipe with so many seeds, its own first, and measure each; `stop` at the first that does not hold."""
-    colors, shapes, noise, first = [], [], [], None
+    colors, shapes, noise, first, seconds = [], [], [], None, 0.0
     at_rule = _traced(right, recipe.wavelengths)
     for seed in range(recipe.seed, recipe.seed + bakes):
         progress(f"bake with seed {seed}", None)
         luts = baking.bake(replace(recipe, seed=seed), device=device, exact=right.exact)
         sets = [luts if o == luts.oxygenation else luts.expand(oxygenation=o) for o in needs.oxygenations]
-        first = first or sets
+        if first is None:
+            first, seconds = sets, luts.manifest["seconds"]["trace"]
         colors.append(np.array([_color_errors(one, right, o) for o, one in enumerate(sets)]))
         shapes.append(np.array([_profile_errors(one, right, o, with_profile) for o, one in enumerate(sets)]))
         if stop and (_worst(colors[-1]) > needs.tolerance or _worst(shapes[-1]) > needs.ee_tolerance):
@@ -121,7 +122,7 @@ def verify(
     return Measured(
         [_worst(errors) for errors in colors], float(np.max(colors)),
         [_worst(errors) for errors in shapes], float(np.max(shapes)),
-        parts, first[0].manifest["seconds"]["trace"] if "seconds" in first[0].manifest else np.nan,
+        parts, seconds,
     )  # fmt: skip
 
 

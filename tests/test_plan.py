@@ -3,6 +3,9 @@
 import itertools
 import json
 import os
+import subprocess
+import sys
+import tomllib
 from dataclasses import replace
 
 import bench_plan
@@ -21,7 +24,6 @@ from lutgen import (
     prediction,
     profiles,
     quadrature,
-    search,
     verifying,
 )
 from lutgen.axes import default_grid
@@ -41,6 +43,18 @@ def exact():
 @pytest.fixture(scope="module")
 def reference():
     return verifying.reference(2**19)
+
+
+@pytest.fixture(scope="module")
+def middling():
+    """The plan of skins from light to dark at the usual tolerance."""
+    return planning.plan(scene("light,dark"))
+
+
+@pytest.fixture
+def few_draws(monkeypatch):
+    """Fewer draws of the noise: a coarser prediction in less time."""
+    monkeypatch.setattr(prediction, "DRAWS", 128)
 
 
 def run(capsys, *arguments):
@@ -111,18 +125,17 @@ def test_an_axis_that_does_not_vary_has_one_node_and_one_that_does_is_as_wide_as
     assert recipe.totals == "anchored"
 
 
-def test_a_tighter_tolerance_never_gives_a_cheaper_recipe():
-    plans = [planning.plan(scene("light,dark", tolerance=tolerance)) for tolerance in (2.0, 1.0, 0.5, 0.25)]
-    costs_ = [plan.cost for plan in plans]
-    assert costs_ == sorted(costs_)
-    assert len(set(costs_)) > 2
+def test_a_tighter_tolerance_never_gives_a_cheaper_recipe(middling):
+    loose, tight = (planning.plan(scene("light,dark", tolerance=tolerance)) for tolerance in (1.5, 0.2))
+    plans = loose, middling, tight
+    assert loose.cost < middling.cost < tight.cost
     for plan in plans:
         assert plan.color_error["total"] <= plan.needs.tolerance
         assert plan.profile_error["at most"] <= plan.needs.ee_tolerance
 
 
-def test_a_wider_pixel_never_asks_more_rings_or_taps():
-    plans = [planning.plan(scene("light", mm_per_pixel=mm)) for mm in (0.02, 0.1, 0.4, 1.0, 3.0, 20.0)]
+def test_a_wider_pixel_never_asks_more_rings_or_taps(few_draws):
+    plans = [planning.plan(scene("light", mm_per_pixel=mm)) for mm in (0.02, 0.3, 1.0, 20.0)]
     tiers = ["off", *(tier.name for tier in costs.tiers())]
     assert plans[0].recipe.rings > plans[-1].recipe.rings
     for narrow, wide in itertools.pairwise(plans):
@@ -148,10 +161,9 @@ def test_a_profile_narrower_than_the_pixel_is_left_out(capsys, tmp_path):
     assert luts.manifest["error"]["color"]["delta_e00_p95"] < 0.5
 
 
-def test_the_parts_of_an_error_bound_what_they_make_together():
+def test_the_parts_of_an_error_bound_what_they_make_together(middling, few_draws):
     """Each part is alone: together they make about the largest at least, and at most their sum."""
-    for tones in ("all", "light,dark"):
-        plan = planning.plan(scene(tones, tolerance=0.8))
+    for plan in (middling, planning.plan(scene("all", tolerance=2.0))):
         for error in (plan.color_error, plan.profile_error):
             parts = [value for name, value in error.items() if name not in ("total", "at most")]
             assert 0.9 * max(parts) <= error["total"] <= 1.05 * sum(parts)
@@ -159,8 +171,8 @@ def test_the_parts_of_an_error_bound_what_they_make_together():
         assert plan.profile_error["total"] <= plan.profile_error["at most"] <= plan.needs.ee_tolerance
 
 
-def test_no_rung_down_is_expected_to_hold():
-    plan = planning.plan(scene("light,dark", tolerance=0.5))
+def test_no_rung_down_is_expected_to_hold(middling):
+    plan = middling
     judged = judging.judge(plan.needs)
     rungs = judged.rungs(plan.recipe)
     assert set(rungs) == {"photons", "color melanin", "profile melanin"}
@@ -172,7 +184,7 @@ def test_no_rung_down_is_expected_to_hold():
     assert cheaper["color melanin"].color.melanin.count == count * 3 // 4
 
 
-def test_oxygenation_that_varies_is_held_at_its_ends_and_costs_stored_paths():
+def test_oxygenation_that_varies_is_held_at_its_ends_and_costs_stored_paths(few_draws):
     fixed, varied = (planning.plan(scene("light", vary, tolerance=1.0)) for vary in ("none", "oxygenation"))
     assert fixed.bytes["paths"] == 0
     assert varied.bytes["paths"] > 0
@@ -180,8 +192,8 @@ def test_oxygenation_that_varies_is_held_at_its_ends_and_costs_stored_paths():
     assert varied.color_error["quadrature"] > fixed.color_error["quadrature"]
 
 
-def test_bytes_are_those_of_the_baked_tables():
-    plan = planning.plan(scene("light,dark", "melanin,hemoglobin,oxygenation", tolerance=1.0))
+def test_bytes_are_those_of_the_baked_tables(few_draws):
+    plan = planning.plan(scene("light,dark", "melanin,hemoglobin,oxygenation", tolerance=2.0))
     luts = baking.bake(replace(plan.recipe, photons=2048))
     assert plan.bytes == {
         "color": 4 * luts.color_lut.acescg.size,
@@ -193,12 +205,12 @@ def test_bytes_are_those_of_the_baked_tables():
 # Limits
 
 
-@pytest.mark.parametrize("limit", [{"bytes": 6000}, {"seconds": 0.9}])
-def test_where_the_tolerance_costs_too_much_it_is_said_what_can_be_had(limit):
+@pytest.mark.parametrize("limit", [{"bytes": 2500}, {"seconds": 1.05}])
+def test_where_the_tolerance_costs_too_much_it_is_said_what_can_be_had(limit, few_draws):
     with pytest.raises(InputError) as error:
-        planning.plan(scene("all", "melanin", tolerance=0.2, ee_tolerance=0.004, **limit))
+        planning.plan(scene("all", "melanin", tolerance=0.2, ee_tolerance=0.006, **limit))
     said = str(error.value)
-    assert f"{next(iter(limit))} = {next(iter(limit.values())):g}: 0.2 ΔE00 with EE 0.004 takes" in said
+    assert f"{next(iter(limit))} = {next(iter(limit.values())):g}: 0.2 ΔE00 with EE 0.006 takes" in said
     words = said.partition("what can be had is ")[2].split()
     had = {words[k].removeprefix("--").replace("-", "_"): float(words[k + 1]) for k in (0, 2)}
     assert had["tolerance"] > 0.2
@@ -300,29 +312,31 @@ def test_verify_sets_measured_beside_predicted(capsys, monkeypatch):
 # The promise
 
 
-def test_a_recipe_that_is_too_coarse_does_not_hold(reference):
-    needs = scene("light,dark", tolerance=0.3)
-    plan = planning.plan(needs)
+def test_a_recipe_that_is_too_coarse_does_not_hold(reference, middling):
+    plan, needs = middling, middling.needs
     right = verifying.truth(needs, plan.recipe, reference)
     for lower in ("color melanin", "photons"):
         recipe = dict(judging.ladder(plan.recipe))[lower]
         assert not verifying.verify(needs, replace(recipe, photons=recipe.photons // 4), right, bakes=2).holds(needs)
 
 
-def test_random_scenes_hold_as_predicted(monkeypatch):
-    """The acceptance of tests/bench_plan.py in small: three scenes, two bakes each, a coarse reference."""
-    for row in bench_plan.rows(3, 2**18, bakes=2, seed=1):
+def test_random_scenes_hold_as_predicted(few_draws):
+    """The acceptance of tests/bench_plan.py in small: two scenes, two bakes each, a coarse reference."""
+    for row in bench_plan.rows(2, 2**18, bakes=2, seed=1):
         assert row.holds, bench_plan.line(row)
         assert 0.5 < row.color[0] / row.color[1] < 2
         assert 0.4 < row.profile[0] / row.profile[1] < 2.5  # the reference's noise counts too
 
 
-def test_spacing_and_search_are_the_same_every_time():
-    needs = scene("light,dark", tolerance=0.7)
-    judged = [judging.judge(needs) for _ in range(2)]
-    first, second = (list(search.candidates(one)) for one in judged)
-    assert first == second
-    assert planning.plan(needs).recipe in first
+def test_the_search_is_the_same_every_time_and_needs_no_opencl(middling):
+    code = (
+        "import sys; from lutgen import config, needs, planning;"
+        "found = planning.plan(needs.scene('light,dark'));"
+        "bad = {'pyopencl', 'colour', 'scipy', 'matplotlib'} & set(sys.modules);"
+        "print(config.toml(found.recipe)) if not bad else sys.exit(str(bad))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert config.from_dict(tomllib.loads(done.stdout)) == middling.recipe
 
 
 def test_an_exact_table_may_be_handed_to_a_bake(exact):

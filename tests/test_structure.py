@@ -168,6 +168,7 @@ def test_wheel_holds_one_name_and_its_data(tmp_path):
         "kernels/path_table.cl", "luts/bake.toml", "luts/default/manifest.json", "luts/default/paths.exr",
         "exports/templates/page.html", "exports/templates/gather.frag.glsl",
         "data/quadrature.csv", "data/color_tables.csv", "data/hemoglobin_prahl_1998.csv", "viewer/__init__.py",
+        "data/plan.csv", "data/plan.exr",
         "exports/templates/import_lutgen.py.txt", "exports/templates/LutgenImporter.cs",
     ):  # fmt: skip
         assert f"lutgen/{name}" in names

@@ -122,7 +122,7 @@ def main() -> None:
     lines = [
         f"# What `lutgen plan` predicts from, by lutgen.data.make_plan: lutgen {facts['lutgen']}, {device.name} "
         f"({device.platform}), seed {SEED} of plan.exr ({PHOTONS} photons at each of {WAVELENGTHS} wavelengths).",
-        "# trace: rule, seconds fixed, and per photon of each wavelength; rest: seconds without the trace.",
+        "# trace: rule, seconds fixed, per photon of each wavelength; rest: seconds of a process without its trace.",
         f"# Seconds: from CPU time, a trace's over {cores} cores.",
         "# tier: name, taps, mm per pixel, EE difference of a disc of 6 pixels.",
         *costs(cores), *tiers(),
