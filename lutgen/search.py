@@ -85,6 +85,7 @@ def least_color(judged: Judge, rule: str) -> Grid | None:
         return None
 
     def error(grid: Grid) -> float:
+        """The systematic error of a grid."""
         return judged.colors.error(rule, grid)
 
     grid = _spaced(judged.coarsest_color, error)
@@ -106,6 +107,7 @@ def profiled(judged: Judge, base: Recipe, rings: int) -> Iterator[Recipe]:
     needs, rule = judged.needs, base.wavelengths
 
     def error(grid: Grid) -> float:
+        """The systematic error of a grid."""
         return prediction.largest(judged.profiles.systematic(rule, rings, grid))
 
     grid = _spaced(judged.coarsest_profile, error)
@@ -131,6 +133,7 @@ def least_photons(judged: Judge, recipe: Recipe) -> Recipe | None:
     off = judged.profiles.systematic(recipe.wavelengths, recipe.rings, recipe.profile)
 
     def holds(photons: float) -> bool:
+        """Whether profiles of that many photons keep their tolerance."""
         found = judged.profiles.with_noise(off, recipe.wavelengths, photons)
         return found.certain <= judged.needs.ee_tolerance
 
