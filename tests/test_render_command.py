@@ -1,7 +1,6 @@
 """`lutgen render`: pictures from the command line, going on, stopping, and one line for what it cannot do."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -194,8 +193,7 @@ def test_what_is_odd_about_a_head_is_said(tmp_path, capsys):
     assert "no head is in the picture" in capsys.readouterr().out
 
 
-@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="whoever may write everywhere")
-def test_a_folder_that_cannot_be_written_is_said_before_any_work(tmp_path, head, capsys):
-    tmp_path.chmod(0o500)
-    assert main(["render", *SMALL, "--mesh", head, "--out", str(tmp_path / "a.exr")]) == 2
-    assert "cannot be written; choose another place" in capsys.readouterr().err
+def test_a_place_that_cannot_be_written_is_said_before_any_work(tmp_path, head, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["render", *SMALL, "--mesh", head, "--out", str(tmp_path / "file" / "a.exr")]) == 2
+    assert "make it first" in capsys.readouterr().err
