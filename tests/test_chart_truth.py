@@ -11,7 +11,7 @@ from lutgen.charts import chart, truth
 from lutgen.errors import MachineError
 
 timing = importlib.import_module("lutgen.viewer.timing")
-EXTENT = truth.QUICK | {"samples": 24}
+EXTENT = truth.QUICK | {"samples": 36}
 
 
 def cost(name: str, taps: int, ratio: float):
