@@ -4,7 +4,7 @@
 
 // How far from its anchor a plane is the surface, mm: less near the surface, for a photon between a plane and a surface
 // that curves away under it would leave too late. With these, what a sphere of 2.5 mm radius reflects under an epidermis
-// that absorbs 5 /mm is .3 % off, of one of 10 mm less than .1 %; with .125 at every depth it is 1.1 % and .3 %.
+// that absorbs 5 /mm is .3 % off, of one of 10 mm less than .1 %; with .125 at every depth it is 1.5 % and .2 %.
 #ifndef LEAST_TRUST
 #define LEAST_TRUST 0.05f
 #define MOST_TRUST 0.125f

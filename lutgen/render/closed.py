@@ -69,6 +69,7 @@ def _rims(edges: np.ndarray) -> list[np.ndarray]:
     label = {int(v): int(v) for v in edges.ravel()}
 
     def root(v: int) -> int:
+        """The vertex that stands for all that v is joined to."""
         while label[v] != v:
             label[v] = label[label[v]]
             v = label[v]

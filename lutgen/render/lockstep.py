@@ -125,6 +125,7 @@ def _staged(on: Stage, seed: int, facts: dict, depths: tuple) -> queues.Staged:
     here = replace(on, arguments=(*on.arguments[:-1], ocl.buffer(on.device, waves)))
 
     def step(entries, exits, part: queues.Part) -> int:
+        """Walk a part and say how many events that took."""
         before = tally.events
         walk(medium, entries, exits, part, seed, on.device, tally, depths)
         facts["photons"] = asdict(tally)
