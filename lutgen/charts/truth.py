@@ -24,8 +24,8 @@ VIEWS = {
 }
 """The default look at 1.3 mm per pixel of a picture of 192 x 192, and the shadow of the nose at 0.13."""
 _MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.13}
-QUICK = {"tiers": ("off", "medium", "high"), "tones": {"portrait": ("light",), "close-up": ("light",)}, "side": 96, "samples": 32, "rounds": 1,
-         "timed": (320, 180)}  # fmt: skip
+QUICK = {"tiers": ("off", "medium", "high"), "side": 96, "samples": 32, "rounds": 1, "timed": (320, 180),
+         "tones": {"portrait": ("light",), "close-up": ("light",)}}  # fmt: skip
 FULL = {"tiers": scene.TIERS, "side": 192, "samples": 32, "rounds": 2, "timed": (640, 360),
         "tones": {"portrait": ("very-light", "light", "intermediate", "tan", "brown", "dark"),
                   "close-up": ("very-light", "dark")}}  # fmt: skip
@@ -127,9 +127,9 @@ def draw(folder: Path, rows: list[Row], extent: dict) -> None:
     """Write the chart `truth`."""
     width, height = extent["timed"]
     notes = (
-        f"Built-in head, default light, {len(extent['tones']['portrait'])} tones: the viewer's linear frame against `lutgen render "
-        f"--walk flat` of {extent['samples']} samples a pixel, {extent['side']} × {extent['side']},\nboxes of 4 × 4 "
-        "pixels, noise taken off (`lutgen compare`). Lines: worst tone; bands: all, close up the lightest and darkest. "
+        f"Built-in head, default light, {len(extent['tones']['portrait'])} tones: the viewer's linear frame against "
+        f"`lutgen render --walk flat` of {extent['samples']} samples a pixel, {extent['side']} × {extent['side']},\nboxes of 4 × 4 "
+        "pixels, noise taken off (`lutgen compare`). Lines: worst tone; bands: all, close up the two extremes. "
         f"Cost: a frame of {width} × {height} over that of a plain head."
     )
     with drawing.figure(
