@@ -26,7 +26,7 @@ VIEWS = {
 _MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.13}
 QUICK = {"tiers": ("off", "medium", "high"), "side": 96, "samples": 32, "rounds": 1, "timed": (320, 180),
          "tones": {"portrait": ("light",), "close-up": ("light",)}}  # fmt: skip
-FULL = {"tiers": scene.TIERS, "side": 192, "samples": 32, "rounds": 2, "timed": (640, 360),
+FULL = {"tiers": scene.TIERS, "side": 192, "samples": 32, "rounds": 3, "timed": (640, 360),
         "tones": {"portrait": ("very-light", "light", "intermediate", "tan", "brown", "dark"),
                   "close-up": ("very-light", "dark")}}  # fmt: skip
 _WIDE, _HIGH = 13.4, 6.3
@@ -126,10 +126,11 @@ def words(rows: list[Row]) -> str:
 def draw(folder: Path, rows: list[Row], extent: dict) -> None:
     """Write the chart `truth`."""
     width, height = extent["timed"]
+    side, tones = extent["side"], len(extent["tones"]["portrait"])
     notes = (
-        f"Built-in head, default light, {len(extent['tones']['portrait'])} tones: the viewer's linear frame against "
-        f"`lutgen render --walk flat` of {extent['samples']} samples a pixel, {extent['side']} × {extent['side']},\nboxes of 4 × 4 "
-        "pixels, noise taken off (`lutgen compare`). Lines: worst tone; bands: all, close up the two extremes. "
+        f"Built-in head, default light, {tones} tones: the viewer's linear frame against `lutgen render --walk flat` of "
+        f"{extent['samples']} samples a pixel, {side} × {side},\nboxes of 4 × 4 pixels, noise taken off (`lutgen "
+        "compare`). Lines: worst tone; bands: all, close up the two extremes. "
         f"Cost: a frame of {width} × {height} over that of a plain head."
     )
     with drawing.figure(
