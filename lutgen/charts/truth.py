@@ -128,8 +128,8 @@ def draw(folder: Path, rows: list[Row], extent: dict) -> None:
     width, height = extent["timed"]
     side, tones = extent["side"], len(extent["tones"]["portrait"])
     notes = (
-        f"Built-in head, default light, {tones} tones: the viewer's linear frame against `lutgen render --walk flat` of "
-        f"{extent['samples']} samples a pixel, {side} × {side},\nboxes of 4 × 4 pixels, noise taken off (`lutgen "
+        f"Built-in head, default light, {tones} tones: the viewer's linear frame against `lutgen render --walk flat` "
+        f"of {extent['samples']} samples a pixel, {side} × {side},\nboxes of 4 × 4 pixels, noise taken off (`lutgen "
         "compare`). Lines: worst tone; bands: all, close up the two extremes. "
         f"Cost: a frame of {width} × {height} over that of a plain head."
     )
