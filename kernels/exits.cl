@@ -1,15 +1,14 @@
 // The flat walk by drawing: where light that enters leaves the flat skin, and with how much of each wavelength
 // (lutgen/render/exits.py).
 #define EXITS __global const float *exit_edges, __global const float *exit_sums, __global const float *exit_energy, \
-    __global const uint2 *exit_places, __global const half *exit_records
-#define EXITS_HERE {exit_edges, exit_sums, exit_energy, exit_places, exit_records}
+    __global const half *exit_paths
+#define EXITS_HERE {exit_edges, exit_sums, exit_energy, exit_paths}
 
 typedef struct {
     __global const float *edges;    // of rings, mm
     __global const float *sums;     // of the cells' probabilities [angle, cell]
     __global const float *energy;   // over probability [angle, cell, wavelength]
-    __global const uint2 *places;   // first record and how many, likewise
-    __global const half *records;   // path in epidermis and dermis, mm
+    __global const half *paths;     // in epidermis and dermis, mm [angle, cell, QUANTILES, wavelength, 2]
 } exits_t;
 
 // Where light leaves that enters at cosine `c` (in air): radius, and azimuth from the plane of incidence. `row`: of its
@@ -33,15 +32,13 @@ inline float2 draw_place(const exits_t *exits, float c, float u, rng_t *rng, int
     return (float2)(radius, next_bits(rng) & SIGN_BIT ? -azimuth : azimuth);
 }
 
-// Share of wavelength k that goes that way, over the way's probability: the mean over DRAWS of the cell's records, evenly
+// Share of wavelength k that goes that way, over the way's probability: the mean over DRAWS of the cell's paths, evenly
 // apart from `which` on among those sorted by length, so that short and long ones are always among them.
 inline float carried(const exits_t *exits, int row, int k, float which, float2 rate) {
-    const uint2 place = exits->places[row + k];
     float sum = 0.0f;
     for (int i = 0; i < DRAWS; i++) {
-        uint record = min((uint)((which + i) * (1.0f / DRAWS) * place.y), max(place.y, 1u) - 1u);
-        float2 path = vload_half2(place.x + record, exits->records);
-        sum += exp_lanes(-fmax(dot(rate, path), 0.0f));
+        int quantile = min((int)((which + i) * (QUANTILES / (float)DRAWS)), QUANTILES - 1);
+        sum += exp_lanes(-fmax(dot(rate, vload_half2(row * QUANTILES + quantile * WAVES + k, exits->paths)), 0.0f));
     }
     return exits->energy[row + k] * (1.0f / DRAWS) * sum;
 }

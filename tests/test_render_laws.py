@@ -74,7 +74,8 @@ def ring_energy(on, found: exits.Exits, monkeypatch, samples: int = 4096, items:
         edges = on.luts.paths.radius_edges_mm.astype("f4")
         kernel = stage.kernel(
             on, "rings", "places", "exits", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1], DRAWS=walks.DRAWS,
-            SECTORS=exits.SECTORS, LEAST_COSINE=float(found.cosines[0]), REACH=1.5, LUT_RINGS=len(edges) - 1,
+            SECTORS=exits.SECTORS, QUANTILES=exits.QUANTILES, LEAST_COSINE=float(found.cosines[0]), REACH=1.5,
+            LUT_RINGS=len(edges) - 1,
         )  # fmt: skip
     sums = np.zeros((items, len(edges) - 1, 2, 3), "f4")
     out = ocl.buffer(on.device, sums)

@@ -24,10 +24,11 @@ VIEWS = {
 }
 """The default look at 1.3 mm per pixel of a picture of 192 x 192, and the shadow of the nose at 0.13."""
 _MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.13}
-QUICK = {"tiers": ("off", "medium", "high"), "tones": ("light",), "side": 96, "samples": 32, "rounds": 1,
-         "timed": (320, 180)}  # fmt: skip
-FULL = {"tiers": scene.TIERS, "tones": ("very-light", "light", "intermediate", "tan", "brown", "dark"), "side": 192,
-        "samples": 64, "rounds": 3, "timed": (640, 360)}  # fmt: skip
+QUICK = {"tiers": ("off", "medium", "high"), "side": 96, "samples": 32, "rounds": 1, "timed": (320, 180),
+         "tones": {"portrait": ("light",), "close-up": ("light",)}}  # fmt: skip
+FULL = {"tiers": scene.TIERS, "side": 192, "samples": 32, "rounds": 3, "timed": (640, 360),
+        "tones": {"portrait": ("very-light", "light", "intermediate", "tan", "brown", "dark"),
+                  "close-up": ("very-light", "dark")}}  # fmt: skip
 _WIDE, _HIGH = 13.4, 6.3
 _MARKS = "os"
 
@@ -76,7 +77,7 @@ def differences(costs: dict, extent: dict, progress: Callable = lambda stage, ta
     opened = app.open_stage(lutgen.load(), shape, given, (side, side))
     try:
         for view, look in VIEWS.items():
-            for tone in extent["tones"]:
+            for tone in extent["tones"][view]:
                 progress(f"render: {view}, {tone}", None)
                 skin = scene.of_preset(tone, look)
                 true = rendered(shape, given, skin, side, extent["samples"])
@@ -125,10 +126,11 @@ def words(rows: list[Row]) -> str:
 def draw(folder: Path, rows: list[Row], extent: dict) -> None:
     """Write the chart `truth`."""
     width, height = extent["timed"]
+    side, tones = extent["side"], len(extent["tones"]["portrait"])
     notes = (
-        f"Built-in head, default light, {len(extent['tones'])} tones: the viewer's linear frame against `lutgen render "
-        f"--walk flat` of {extent['samples']} samples a pixel, {extent['side']} × {extent['side']},\nboxes of 4 × 4 "
-        "pixels, noise taken off (`lutgen compare`). Lines: worst tone; bands: all tones. "
+        f"Built-in head, default light, {tones} tones: the viewer's linear frame against `lutgen render --walk flat` "
+        f"of {extent['samples']} samples a pixel, {side} × {side},\nboxes of 4 × 4 pixels, noise taken off (`lutgen "
+        "compare`). Lines: worst tone; bands: all, close up the two extremes. "
         f"Cost: a frame of {width} × {height} over that of a plain head."
     )
     with drawing.figure(

@@ -72,7 +72,8 @@ def flat(on: Stage, seed: int = 0, photons: int | None = None) -> Flat:
     seconds = {"walk": time.perf_counter() - since, "pictures": 0.0}
     built = stage.kernel(
         on, "flat", "places", "exits", "flat", ANGLES=len(found.cosines), CELLS=found.drawn.shape[1],
-        SECTORS=exits.SECTORS, GROUP=GROUP, DRAWS=DRAWS, LEAST_COSINE=float(found.cosines[0]), REACH=REACH,
+        SECTORS=exits.SECTORS, QUANTILES=exits.QUANTILES, GROUP=GROUP, DRAWS=DRAWS, REACH=REACH,
+        LEAST_COSINE=float(found.cosines[0]),
     )  # fmt: skip
     color, sigma = found.color(on.luts, skin)
     facts = {
