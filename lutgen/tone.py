@@ -18,7 +18,7 @@ def shown(acescg: np.ndarray, exposure: float = 0.0) -> np.ndarray:
     whose shoulder colors stay what they are.
 
     >>> shown(np.array([[0.18, 0.18, 0.18], [50.0, 0.0, 0.0]])).round(3).tolist()
-    [[0.408, 0.408, 0.408], [1.0, 0.928, 0.895]]
+    [[0.41, 0.41, 0.41], [1.0, 0.955, 0.958]]
     """
     linear = color.from_acescg(np.asarray(acescg, float) * 2.0**exposure, "srgb")
     gray, least = np.maximum(linear @ _LUMINANCE, 0)[..., None], linear.min(axis=-1, keepdims=True)
