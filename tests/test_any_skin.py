@@ -78,7 +78,7 @@ def test_adding_doubling_keeps_energy_exactly_in_any_stack(layers):
     diffuse, specular, transmitted, absorbed = adding_doubling.stack(layers)
     assert diffuse + specular + transmitted + absorbed.sum() == pytest.approx(1, abs=1e-9)
     assert min(diffuse, transmitted) >= 0
-    # A layer's absorption is what is left of sums over both directions of N nodes. Rounding spreads each of the 2N terms
+    # A layer's absorption is what is left of sums over both directions of N nodes. Rounding spreads each of 2N terms
     # evenly over an epsilon, a standard deviation of eps / sqrt(12); four of a sum's are allowed, of the light in the
     # layer: total reflection keeps some inside, but no more than n^2 of the light outside goes each way. Doubling
     # doubles it: it grows with the optical thickness along the most grazing node.
