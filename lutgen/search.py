@@ -15,6 +15,8 @@ from lutgen.needs import Needs
 
 COLOR_MARGIN = 0.97
 """Share of the tolerance that predicted colors may take: another 1,500 skins differ by so much in their percentile."""
+PROFILE_MARGIN = 0.95
+"""Share of the tolerance that profiles may take at most: other skins, and the noise of what they are compared with."""
 RING_SHARE = 1 / 3
 """Share of the profile's tolerance that rings alone may take."""
 NEGLIGIBLE = 0.1
@@ -111,7 +113,7 @@ def profiled(judged: Judge, base: Recipe, rings: int) -> Iterator[Recipe]:
     grid = _spaced(judged.coarsest_profile, error)
     before = np.inf
     while True:
-        if error(grid) < needs.ee_tolerance:
+        if error(grid) < PROFILE_MARGIN * needs.ee_tolerance:
             recipe = least_photons(judged, replace(base, rings=rings, profile=grid))
             if recipe is not None:
                 yield recipe
@@ -132,7 +134,7 @@ def least_photons(judged: Judge, recipe: Recipe) -> Recipe | None:
 
     def holds(photons: float) -> bool:
         found = judged.profiles.with_noise(off, recipe.wavelengths, photons)
-        return found.certain <= judged.needs.ee_tolerance
+        return found.certain <= PROFILE_MARGIN * judged.needs.ee_tolerance
 
     if not holds(PHOTONS[1]):
         return None
