@@ -139,8 +139,9 @@ def nodes(grid: Grid) -> str:
     return " × ".join(str(getattr(grid, axis).count) for axis in judging.AXES)
 
 
-def unaffordable(needs: Needs, found: list[tuple[float, int]]) -> InputError:
+def unaffordable(judged: Judge, found: list[tuple[float, int]]) -> InputError:
     """What to raise where no recipe is within the bytes and seconds allowed: it says which tolerances are."""
+    needs = judged.needs
     spent = min(seconds for seconds, _ in found), min(size for _, size in found)
     over = [
         f"{name} = {most:g}: {needs.tolerance:g} ΔE00 with EE {needs.ee_tolerance:.2g} takes {least}"
@@ -150,7 +151,7 @@ def unaffordable(needs: Needs, found: list[tuple[float, int]]) -> InputError:
         )
         if too_much
     ] or [f"seconds = {needs.seconds:g} with bytes = {needs.bytes}: no recipe keeps both"]
-    scale = _had(needs)
+    scale = _had(judged)
     if scale is None:
         return InputError(f"{'; '.join(over)}; no tolerance can be had for so little")
     had = _scaled(needs, scale)
@@ -171,14 +172,15 @@ def _rounded_up(value: float, digits: int) -> float:
     return float(f"{np.ceil(value / step - 1e-9) * step:.{digits}g}")
 
 
-def _had(needs: Needs) -> float | None:
+def _had(judged: Judge) -> float | None:
     """The least factor on both tolerances, to 5 %, that some recipe fits, or None."""
 
     def fits(scale: float) -> bool:
         """Whether any recipe keeps both tolerances times a factor."""
-        judged = judging.judge(_scaled(needs, scale))
-        return any(search.fits(judged, recipe) for recipe in search.candidates(judged))
+        asked = judged.asked(_scaled(judged.needs, scale))
+        return any(search.fits(asked, recipe) for recipe in search.candidates(asked))
 
+    needs = judged.needs
     low, high = 1.0, max(TOLERANCE[1] / needs.tolerance, EE_TOLERANCE[1] / needs.ee_tolerance)
     if not fits(high):
         return None

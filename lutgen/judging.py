@@ -26,22 +26,18 @@ _PLAIN = "8"
 
 @dataclass(frozen=True)
 class Judge:
-    """Predicts errors of recipes for one scene."""
+    """Predicts errors of recipes for one scene; the coarsest tables are what others are refined from."""
 
     needs: Needs
     colors: Colors
     profiles: Profiles
     with_profile: bool
+    coarsest_color: Grid
+    coarsest_profile: Grid
 
-    @cached_property
-    def coarsest_color(self) -> Grid:
-        """The color table that others are refined from."""
-        return coarsest(self.needs, lambda alone, grid: Colors(alone, self.colors.exact).interpolation(_PLAIN, grid))
-
-    @cached_property
-    def coarsest_profile(self) -> Grid:
-        """The profile table that others are refined from."""
-        return coarsest(self.needs, lambda alone, grid: Profiles(alone).interpolation(_PLAIN, grid))
+    def asked(self, needs: Needs) -> Judge:
+        """The same scene asked with other tolerances, bytes or seconds: what has been worked out about it stays."""
+        return replace(self, needs=needs, with_profile=self.profiles.unscattered() > needs.ee_tolerance)
 
     def color(self, recipe: Recipe) -> float:
         """Color error, 95th percentile of ΔE00."""
@@ -76,11 +72,13 @@ class Judge:
         return costs.total_seconds(recipe), sum(spent.values())
 
 
-def judge(needs: Needs, skin=None) -> Judge:
+def judge(needs: Needs) -> Judge:
     """What judges recipes for a scene."""
-    profiles = Profiles(needs)
-    exact = prediction.exact_totals(skin or Recipe().skin)
-    return Judge(needs, Colors(needs, exact), profiles, profiles.unscattered() > needs.ee_tolerance)
+    colors, profiles = Colors(needs, prediction.exact_totals(Recipe().skin)), Profiles(needs)
+    coarse_color = coarsest(needs, lambda alone, grid: Colors(alone, colors.exact).interpolation(_PLAIN, grid))
+    coarse_profile = coarsest(needs, lambda alone, grid: Profiles(alone).interpolation(_PLAIN, grid))
+    with_profile = profiles.unscattered() > needs.ee_tolerance
+    return Judge(needs, colors, profiles, with_profile, coarse_color, coarse_profile)
 
 
 def ladder(recipe: Recipe, with_profile: bool = True) -> Iterator[tuple[str, Recipe]]:

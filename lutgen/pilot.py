@@ -68,6 +68,12 @@ def at(found: PathTable, rule: str) -> tuple[PathTable, np.ndarray]:
     return table, rgb_weights(chosen.xyz_weights)
 
 
+@cache
+def stored(rule: str) -> tuple[PathTable, np.ndarray]:
+    """The stored paths at a rule's wavelengths, and their ACEScg weights [K, 3]."""
+    return at(paths(), rule)
+
+
 def within(radius_edges_mm: np.ndarray, radius_mm: np.ndarray) -> np.ndarray:
     """Matrix [R, B + 1]: encircled energy at radii from that at ring edges, cubic in the logarithm of the radius.
 

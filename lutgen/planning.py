@@ -30,5 +30,5 @@ def plan(needs: Needs) -> Plan:
         )
     allowed = [recipe for recipe in found if search.fits(judged, recipe)]
     if not allowed:
-        raise explaining.unaffordable(needs, [judged.cost(recipe) for recipe in found])
+        raise explaining.unaffordable(judged, [judged.cost(recipe) for recipe in found])
     return explaining.explained(judged, search.chosen(judged, allowed))

@@ -204,7 +204,7 @@ class Profiles:
     def _own(self, rule: str) -> tuple[np.ndarray, np.ndarray]:
         """Encircled energy [O, P, 3, B + 1] at the skins themselves, and total ACEScg [O, P, 3]."""
         if ("own", rule) not in self._cache:
-            table, weights = pilot.at(pilot.paths(), rule)
+            table, weights = pilot.stored(rule)
             found = []
             for oxygenation in self.needs.oxygenations:
                 absorb = expansion.absorbers(table.wavelength_nm, oxygenation)
@@ -217,7 +217,7 @@ class Profiles:
     def _between(self, rule: str, grid: Grid) -> np.ndarray:
         """Encircled energy [O, P, 3, B + 1] interpolated between a grid's nodes."""
         if ("between", rule, grid) not in self._cache:
-            table, weights = pilot.at(pilot.paths(), rule)
+            table, weights = pilot.stored(rule)
             found = []
             for oxygenation in self.needs.oxygenations:
                 absorb = expansion.absorbers(table.wavelength_nm, oxygenation)
@@ -229,7 +229,7 @@ class Profiles:
     def _unit_noise(self, rule: str) -> np.ndarray:
         """Noise [draws, O, P, 3, R] of encircled energy with one photon per wavelength."""
         if ("noise", rule) not in self._cache:
-            table, weights = pilot.at(pilot.paths(), rule)
+            table, weights = pilot.stored(rule)
             nm, totals_ = table.wavelength_nm, self._own(rule)[1]
             nu = np.minimum(chromophores.epidermis_range(nm)[0], chromophores.dermis_range(nm)[0])
             mu = [

@@ -15,6 +15,8 @@ from lutgen.needs import Needs
 
 COLOR_MARGIN = 0.97
 """Share of the tolerance that predicted colors may take: another 1,500 skins differ by so much in their percentile."""
+PROFILE_MARGIN = 0.95
+"""Share of the tolerance that profiles may take at most: other skins, and the noise of what they are compared with."""
 RING_SHARE = 1 / 3
 """Share of the profile's tolerance that rings alone may take."""
 NEGLIGIBLE = 0.1
@@ -111,12 +113,13 @@ def profiled(judged: Judge, base: Recipe, rings: int) -> Iterator[Recipe]:
         return prediction.largest(judged.profiles.systematic(rule, rings, grid))
 
     grid = _spaced(judged.coarsest_profile, error)
-    before = np.inf
+    before, photons = np.inf, PHOTONS[1]
     while True:
-        if error(grid) < needs.ee_tolerance:
-            recipe = least_photons(judged, replace(base, rings=rings, profile=grid))
+        if error(grid) < PROFILE_MARGIN * needs.ee_tolerance:
+            recipe = least_photons(judged, replace(base, rings=rings, profile=grid), photons)
             if recipe is not None:
                 yield recipe
+                photons = recipe.photons
                 # Finer tables save photons, until a rung down holds too: go on only for what is still too slow.
                 spent, rungs = judged.cost(recipe)[0], judged.rungs(recipe)
                 held = [name for name, share in rungs.items() if share <= LEEWAY]
@@ -128,23 +131,24 @@ def profiled(judged: Judge, base: Recipe, rings: int) -> Iterator[Recipe]:
             return
 
 
-def least_photons(judged: Judge, recipe: Recipe) -> Recipe | None:
-    """The recipe with the fewest photons with which its profiles hold in eight bakes, or None where none do."""
+def least_photons(judged: Judge, recipe: Recipe, most: int = PHOTONS[1]) -> Recipe | None:
+    """The recipe with the fewest photons, up to `most`, with which its profiles hold in eight bakes, or None."""
     off = judged.profiles.systematic(recipe.wavelengths, recipe.rings, recipe.profile)
 
-    def holds(photons: float) -> bool:
-        """Whether profiles of that many photons keep their tolerance."""
-        found = judged.profiles.with_noise(off, recipe.wavelengths, photons)
-        return found.certain <= judged.needs.ee_tolerance
+    def holds(octave: float) -> bool:
+        """Whether profiles of 2 ** octave photons keep their tolerance."""
+        found = judged.profiles.with_noise(off, recipe.wavelengths, 2**octave)
+        return found.certain <= PROFILE_MARGIN * judged.needs.ee_tolerance
 
-    if not holds(PHOTONS[1]):
-        return None
-    if holds(PHOTONS[0]):
-        return replace(recipe, photons=PHOTONS[0])
-    low, high = np.log2(PHOTONS)
+    least, high = np.log2(PHOTONS[0]), np.log2(most)
+    if not holds(high):
+        return None if most == PHOTONS[1] else least_photons(judged, recipe)
+    while high > least and holds(low := max(high - 2, least)):
+        high = low
+    low = max(high - 2, least)
     while high - low > 1 / 32:
         middle = (low + high) / 2
-        low, high = (low, middle) if holds(2**middle) else (middle, high)
+        low, high = (low, middle) if holds(middle) else (middle, high)
     return replace(recipe, photons=int(np.ceil(2**high)))
 
 
