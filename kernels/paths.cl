@@ -36,7 +36,7 @@ inline float3 way_along(float3 n, float3 d) {
 inline float3 gathered(const scene_t *s, const surface_t *there, float3 color, start_t *next, rng_t *rng, uint *tally) {
     float3 light = color * sunlight(s, there, toward_sun(s, rng), tally + SUN_RAYS);
     next->hit.triangle = -1;
-    if (s->view->environment > 0.0f) {
+    if (s->view->around) {
         float weight;
         next->direction = toward_surroundings(s, there, rng, &weight);
         tally[SKY_RAYS]++;
@@ -70,9 +70,8 @@ inline float3 reflected(const scene_t *s, const surface_t *here, float3 d, start
     }
     float weight = 0.0f;
     mirrored->direction = toward_reflection(s, here, n, v, rng, &weight);
-    if (s->view->environment > 0.0f)
-        weight *= worth(s, here->gloss * weight * s->view->environment * sky_strength(s, mirrored->direction), rng);
-    if (s->view->environment > 0.0f && weight > 0.0f) {
+    if (s->view->around) weight *= worth(s, here->gloss * weight * sky_strength(s, mirrored->direction), rng);
+    if (s->view->around && weight > 0.0f) {
         tally[SKY_RAYS]++;
         mirrored->hit = nearest(s, start(here), mirrored->direction);
         if (mirrored->hit.triangle < 0) light += weight * surroundings(s, mirrored->direction);

@@ -71,6 +71,9 @@ def test_the_same_command_goes_on_and_another_one_is_refused(tmp_path, head, cap
     same = run(capsys, "--mesh", head, "--spp", "25", "--out", out)
     assert same["samples"] == 25
     assert same["rays"] == 0
+    (part,) = exr.read(Path(out)).values()
+    for name in ("CAMERA_RAYS", "PROBES", "MISSES", "REJECTED"):
+        assert part.attributes["render"]["counts"][name] == first["counts"][name] + more["counts"][name]
     before = Path(out).read_bytes()
     for changed, message in (
         (["--set", "melanin=0.05"], "look.melanin 0.0195, now 0.05"), (["--seed", "3"], "seed 0, now 3"),

@@ -9,6 +9,7 @@ from rendering import BARE, EVEN, FRONT, PHOTONS, SKY, SUN, ball, mean, opened, 
 import lutgen
 from lutgen import device as ocl
 from lutgen import expansion, lighting
+from lutgen.mesh import Mesh
 from lutgen.render import exits, stage, walks
 from lutgen.scene import Look, of_preset
 
@@ -164,21 +165,40 @@ def test_rims_lose_nothing():
     assert np.all(np.abs(small - large) < SIGMAS * np.hypot(one, two) + 0.002 * large)
 
 
+def bowl() -> Mesh:
+    """The inside of a ball of 100 mm that is open toward +z."""
+    whole = ball(100.0, inward=True)
+    front = whole.positions_mm[whole.triangles][:, :, 2].max(axis=1) > 20
+    return replace(whole, triangles=whole.triangles[~front])
+
+
 def test_skin_lights_skin_and_never_more_than_the_sky():
     """A bowl under an even sky: what skin sends to skin brightens it, and nothing outshines the sky."""
-    bowl = ball(100.0, inward=True)
-    front = bowl.positions_mm[bowl.triangles][:, :, 2].max(axis=1) > 20
-    bowl = replace(bowl, triangles=bowl.triangles[~front])
     look = replace(SKY, distance_mm=600, melanin=0.001, hemoglobin=0.001, field_of_view=12.0)
     found = []
     for bounces in (0, 1, 6):
-        on = opened(bowl, look, around=EVEN, bounces=bounces)
+        on = opened(bowl(), look, around=EVEN, bounces=bounces)
         made, counts = sampled(on, walks.flat(on, photons=PHOTONS), 20)
         found.append(mean(made)[0])
         assert (counts["BOUNCES"] > 0) == (bounces > 0)
     assert np.all(found[0] < 0.9 * found[1])
     assert np.all(found[1] < found[2])
     assert np.all(found[2] < 1)
+
+
+@pytest.mark.parametrize("specular", [0.0, 1.0])
+@pytest.mark.parametrize("walk", ["flat", "flat-full"])
+def test_sunlit_skin_lights_skin_without_surroundings(walk, specular):
+    """A bowl lit by the sun alone is as bright as under a sky too faint to see, and brighter than without bounces."""
+    look = replace(SUN, light_azimuth=50.0, distance_mm=600, field_of_view=12.0, melanin=0.001, specular=specular)
+    found = []
+    for environment, bounces in ((0.0, 3), (1e-5, 3), (0.0, 0)):
+        on = opened(bowl(), replace(look, environment=environment), around=EVEN, bounces=bounces)
+        found.append(mean(sampled(on, walks.WALKS[walk](on, 0), 160)[0]))
+    (dark, one), (faint, two), (alone, three) = found
+    assert np.all(np.abs(dark - faint) < SIGMAS * np.hypot(one, two))
+    assert np.all(dark > alone + SIGMAS * np.hypot(one, three))
+    assert np.all(np.hypot(one, two) < 0.03 * dark)
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 70.0])

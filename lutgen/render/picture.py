@@ -2,7 +2,8 @@
 
 Channels: R, G, B (linear ACEScg radiance, averaged over the whole pixel, black beside the head), mask (share of the
 pixel that the head covers), samples, sigma.R, .G, .B (standard error of R, G, B, from the samples' own spread), and
-square.RR ... .GB (means of products of samples), from which a later run goes on. Attributes: what it was made of.
+square.RR ... .GB (means of products of samples), from which a later run goes on. Attributes: what it was made of, and
+counts of rays by kind, of exits without a surface (MISSES) or on one that faces away (REJECTED), over all runs.
 """
 
 from __future__ import annotations

@@ -93,13 +93,15 @@ def render(
     tallies = np.zeros((items(stage, pixels), len(TALLIES)), "u4")
     tally_buffer = ocl.buffer(device, tallies)
     made, held, noise = start, 0, float("inf")
+    earlier = start.facts.get("counts", {})
     limit = None if goal.samples is None else -(-goal.samples // group) * group
 
     def gathered() -> Picture:
-        """The picture with what the device holds."""
+        """The picture with what the device holds, and what was counted for it in all runs."""
         moments = ocl.read(device, held_buffer, np.zeros((pixels, picture.MOMENTS), "f4"))
         sums = made.sums + moments.reshape(made.sums.shape)
-        return replace(made, sums=sums, estimates=made.estimates + held)
+        counts = {name: earlier.get(name, 0) + count for name, count in tally.counts.items()} or earlier
+        return replace(made, sums=sums, estimates=made.estimates + held, facts=made.facts | {"counts": counts})
 
     while True:
         done = (made.estimates + held) * group

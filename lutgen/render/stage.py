@@ -35,6 +35,8 @@ PIXELS = {"cpu": 64, "gpu": 1}
 CANDIDATES, STRIDE, SKY_CELLS, LEAST_SKY = 4, 1, 64, 0.25
 """Directions into the surroundings that one is drawn from, in which order of sine; cells along a side of the table that
 they are drawn by, and what each counts at least, as a share of the mean radiance."""
+SUNLIT = 0.1
+"""Of light that meets skin, about what it sends on."""
 STUDIO_ROWS, MOST_ROWS = 256, 1024
 _LOBES, _EXIT_MEANS = lighting.ggx_albedo().shape[0], len(lighting.exit_means())
 
@@ -47,7 +49,7 @@ VIEW = np.dtype(
         (name, "f4")
         for name in ("sun_spread", "environment", "faint", "roughness", "specular", "bumps", "entry", "pore_side_mm")
     ]
-    + [(name, "i4") for name in ("columns", "rows", "pore_texels", "environment_rows", "sunny", "bounces")]
+    + [(name, "i4") for name in ("columns", "rows", "pore_texels", "environment_rows", "sunny", "around", "bounces")]
     + [("seed", "u4"), ("exit_means", "f4", (_EXIT_MEANS,))]
 )
 """What stays the same over a picture; `view_t` in the kernels."""
@@ -93,7 +95,7 @@ def open_stage(
     arrays = (
         tree.boxes, tree.children, tree.triangles, tree.numbers, view,
         np.concatenate([shape.positions_mm, shape.normals, uv], axis=1).astype("f4"), shape.triangles.astype("i4"),
-        *(textures[name] for name in PLAIN), pores.texture(), radiance, _sky(radiance[..., :3]),
+        *(textures[name] for name in PLAIN), pores.texture(), radiance, _sky(radiance[..., :3], look),
         lighting.ggx_albedo().astype("f4"), waves(luts, look.oxygenation),
     )  # fmt: skip
     return Stage(device, luts, shape, view, tuple(ocl.buffer(device, values) for values in arrays), width)
@@ -169,17 +171,21 @@ def _surroundings(around: np.ndarray | None) -> np.ndarray:
     return np.concatenate([radiance, np.zeros((*radiance.shape[:2], 1))], axis=-1).astype("f4")
 
 
-def _sky(radiance: np.ndarray) -> np.ndarray:
-    """Mean radiance [64, 64] of the surroundings by cells of an octahedron, unfolded with the sky in the middle."""
+def _sky(radiance: np.ndarray, look: Look) -> np.ndarray:
+    """Mean radiance [64, 64] of the surroundings by cells of an octahedron, unfolded with the sky in the middle.
+
+    Skin may be there instead: none is less than a share of the mean, or of what sunlit skin sends.
+    """
     finer = np.repeat(np.repeat(radiance, k := -(-STUDIO_ROWS // len(radiance)), axis=0), k, axis=1)
     ways, angle = environment.directions(len(finer))
     p = ways / np.abs(ways).sum(axis=-1, keepdims=True)
     x, z = (np.where(p[..., 1] < 0, np.copysign(1 - np.abs(p[..., 2 - i]), p[..., i]), p[..., i]) for i in (0, 2))
     column, row = (np.minimum((0.5 + 0.5 * v) * SKY_CELLS, SKY_CELLS - 1).astype(int) for v in (x, z))
     cell = (row * SKY_CELLS + column).ravel()
-    light = np.bincount(cell, (finer.mean(axis=-1) * angle).ravel(), SKY_CELLS**2)
+    light = look.environment * np.bincount(cell, (finer.mean(axis=-1) * angle).ravel(), SKY_CELLS**2)
     mean = light / np.maximum(np.bincount(cell, angle.ravel(), SKY_CELLS**2), 1e-9)
-    return np.maximum(mean, max(LEAST_SKY * mean.mean(), 1e-20)).astype("f4")
+    least = LEAST_SKY * max(mean.mean(), SUNLIT * look.light / np.pi)
+    return np.maximum(mean, max(least, 1e-20)).astype("f4")
 
 
 def _view(
@@ -196,11 +202,12 @@ def _view(
         "sun_color": look.light * lighting.SUN, "sun_spread": 2 * np.sin(np.radians(look.light_size) / 2) ** 2,
         "chromophores": [getattr(look, a.name) for a in axes], "chromophores_low": [a.low for a in axes],
         "chromophores_high": [a.high for a in axes],
-        "turn": (np.cos(turn), np.sin(turn)), "environment": look.environment if radiance.any() else 0.0,
+        "turn": (np.cos(turn), np.sin(turn)), "environment": look.environment,
         "faint": FAINT * (look.light / np.pi + look.environment * float(radiance[..., :3].mean())) + 1e-20,
         "roughness": look.roughness, "specular": look.specular, "bumps": look.bumps, "entry": look.entry,
         "pore_side_mm": pores.SIDE_MM, "columns": size[0], "rows": size[1], "pore_texels": pores.TEXELS,
-        "environment_rows": len(radiance), "sunny": look.light > 0, "bounces": bounces, "seed": seed,
+        "environment_rows": len(radiance), "sunny": look.light > 0, "bounces": bounces,
+        "around": (look.environment > 0 and radiance[..., :3].any()) or (look.light > 0 and bounces > 0), "seed": seed,
         "exit_means": lighting.exit_means(),
     }  # fmt: skip
     for name in PLAIN:
