@@ -116,7 +116,9 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--mesh", metavar="FILE", help="GLB, glTF, OBJ or lee-perry-smith (default: built-in)")
         command.add_argument("--mm-per-unit", type=float, help="millimetres per unit of the mesh (default: a guess)")
         command.add_argument("--flip-v", action="store_true", help="turn the mesh's texture coordinates upside down")
-        command.add_argument("--maps", metavar="DIR", help="texture maps by name: melanin.png, normal.png, ...")
+        command.add_argument(
+            "--maps", metavar="DIR", help="texture maps by name: melanin.png, normal.png, ...; or none"
+        )
         command.add_argument("--albedo", default="recolor", help="a painted albedo: recolor it or invert it to maps")
         command.add_argument(
             "--environment", default="studio", metavar="NAME", help="studio, none or an equirectangular .exr or .hdr"

@@ -14,6 +14,8 @@ from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 
 MAX_SIDE = 4096
+NO_MAPS = "none"
+"""What stands for a folder of maps where skin shall be the same all over."""
 ALBEDO = ("recolor", "invert")
 """What is made of a painted albedo: its detail laid over any skin, or maps of pigment and blood."""
 
@@ -30,7 +32,8 @@ def size_of(text: str) -> tuple[int, int]:
 
 
 def model(name: str | None, mm_per_unit: float | None, folder: str | None, flip_v: bool = False) -> tuple[Mesh, Maps]:
-    """The head and its maps: built-in without a name; painted maps, under the file's own, under those of a folder.
+    """The head and its maps: built-in without a name; painted maps, under the file's own, under those of a folder, or
+    none at all.
 
     Skin that is painted into an albedo is not painted a second time: beside one, lips and freckles are its own, and
     only gloss, pores, open sky and thickness are generated. Where a face is found the head is moved so that the
@@ -42,7 +45,9 @@ def model(name: str | None, mm_per_unit: float | None, folder: str | None, flip_
         found = replace(found, chromophores=None, albedo=color.decode_srgb(shape.textures["albedo"] / 255.0))
     if "normal" in shape.textures:
         found = replace(found, normal=shape.textures["normal"])
-    if folder is not None:
+    if folder == NO_MAPS:
+        found = Maps()
+    elif folder is not None:
         found = maps.load(Path(folder), found)
     centered = (shape.positions_mm - painting.origin_mm(shape)).astype("f4")
     return replace(shape, positions_mm=centered, notes=(*shape.notes, *painting.notes(shape))), found

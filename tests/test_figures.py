@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lutgen.charts import comparisons, drawing, figures, spectra
+from lutgen.charts import comparisons, drawing, figures, portraits, spectra
 from lutgen.errors import InputError, MachineError
 from lutgen.solvers import adding_doubling, direct
 from lutgen.tissue import PRESETS, Skin, layers, preset
@@ -20,10 +20,10 @@ AT = (420.0, 550.0, 700.0)
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory) -> Path:
-    """Every figure, its strips three colors long."""
+    """Every figure, its strips three colors long, its portraits small."""
     pytest.importorskip("matplotlib")
     out = tmp_path_factory.mktemp("figures") / "out"
-    shown = figures.draw(out, steps=3)
+    shown = figures.draw(out, steps=3, size=(22, 27))
     assert {path.stem for path in out.iterdir()} == set(shown)
     return out
 
@@ -80,7 +80,7 @@ def test_every_figure_comes_as_svg_png_and_csv(drawn):
     assert {path.name for path in drawn.iterdir()} == {f"{n}.{kind}" for n in names for kind in ("svg", "png", "csv")}
     assert names == {
         "sweep-melanin", "sweep-hemoglobin", "sweep-eumelanin", "skin-types", "scattering-curves", "scattering-colors",
-        "presets", "published",
+        "presets", "published", "portraits",
     }  # fmt: skip
     for name in names:
         assert len(rows_of(drawn, name)) > 1
@@ -125,6 +125,29 @@ def test_tables_tell_laws_and_sources(drawn):
     for name, values in comparisons.DONNER_JENSEN.items():
         assert tuple(float(printed[name][key]) for key in ("melanin", "eumelanin", "hemoglobin")) == values
     assert {row["preset"] for row in rows_of(drawn, "presets")} == set(PRESETS)
+
+
+def test_portraits_grow_calmer_with_samples_and_are_as_bright_as_their_skin(drawn):
+    rows = {(r["preset"], r["textures"], int(r["samples"])): r for r in rows_of(drawn, "portraits")}
+    assert len(rows) == 3 * (2 * 3 + 1)
+    for name in comparisons.TYPES:
+        own = f"source-{name.lower()}"
+        for kind in (portraits.BARE, portraits.TEXTURED):
+            noise = [float(rows[own, kind, n]["noise_delta_e00"]) for n in portraits.SAMPLES]
+            assert noise == sorted(noise, reverse=True)
+            assert noise[0] / noise[2] == pytest.approx((150 / 20) ** 0.5, rel=0.35)
+        shares = [float(rows[own, kind, 150]["brightness"]) for kind in (portraits.BARE, portraits.TEXTURED)]
+        assert shares[1] < shares[0]  # brows, lips and lashes
+    brightness = [float(rows[f"source-{n.lower()}", portraits.BARE, 150]["brightness"]) for n in comparisons.TYPES]
+    assert brightness == sorted(brightness, reverse=True)
+    pixels = np.asarray(Image.open(drawn / "portraits.png").convert("L"))
+    assert (pixels < 60).mean() > 0.1  # the heads' dark backdrop
+
+
+def test_portraits_are_left_out_where_there_is_no_opencl(tmp_path, monkeypatch):
+    monkeypatch.setattr(portraits.ocl, "devices", lambda: ())
+    assert portraits.portraits(tmp_path).startswith("left out: no OpenCL device")
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_same_numbers_give_the_same_bytes(drawn, tmp_path):

@@ -333,6 +333,8 @@ def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_pa
     assert found.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
     assert found.normal[0, 0, 2] == 1
     assert found.albedo is not None
+    _, found = subject.model("a.glb", None, subject.NO_MAPS)
+    assert found == Maps()
 
 
 def test_a_head_without_texture_coordinates_is_drawn_and_said(tmp_path, capsys):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lutgen import color
-from lutgen.charts import comparisons, drawing
+from lutgen.charts import comparisons, drawing, portraits
 from lutgen.charts.drawing import DASHES, GRAY, HUES, inches
 from lutgen.charts.spectra import (
     ABSORPTIONS,
@@ -35,10 +35,14 @@ AXIS_NAMES = {
 }
 
 
-def draw(out: Path, steps: int = STEPS, progress: Callable = lambda stage, tally: None) -> dict[str, str]:
+def draw(
+    out: Path, steps: int = STEPS, size: tuple[int, int] = portraits.SIZE,
+    progress: Callable = lambda stage, tally: None,
+) -> dict[str, str]:  # fmt: skip
     """Draw every figure into the folder `out`, which appears whole or not at all; what each shows, by its name.
 
-    `steps`: colors along a strip. Raises InputError where `out` holds something, MachineError without matplotlib.
+    `steps`: colors along a strip; `size`: pixels of a portrait. Raises InputError where `out` holds something,
+    MachineError without matplotlib.
     """
     stages = {f"sweep-{name}": lambda folder, name=name: sweep_figure(folder, name, steps) for name in SWEEPS} | {
         "skin-types": skin_types,
@@ -46,6 +50,7 @@ def draw(out: Path, steps: int = STEPS, progress: Callable = lambda stage, tally
         "scattering-colors": lambda folder: comparisons.law_colors(folder, steps),
         "presets": comparisons.presets,
         "published": comparisons.published,
+        "portraits": lambda folder: portraits.portraits(folder, size, progress),
     }
     shown = {}
     with drawing.folder(out) as folder:

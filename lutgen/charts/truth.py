@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from math import log10
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,8 @@ import numpy as np
 import lutgen
 from lutgen import device as ocl
 from lutgen import extras, scene, subject
-from lutgen.charts import drawing
-from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
-from lutgen.errors import MachineError
+from lutgen.charts import drawing, tiers
+from lutgen.charts.drawing import DASHES, HUES, INK, inches
 from lutgen.render import difference, picture, pictures, progressive, stage, walks
 from lutgen.scene import Look
 
@@ -51,19 +49,10 @@ class Row:
 
 def truth(folder: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> str:
     """The chart `truth`; its main figures in words, or why it was left out: it needs OpenGL and the extra `view`."""
-    try:
-        extras.viewer("gl").context()
-        app = extras.viewer("app")
-    except MachineError as error:
-        return f"left out: {error}"
     extent = QUICK if quick else FULL
-    timing, stages = extras.viewer("timing"), extras.viewer("stages")
-    opened = app.open_stage(lutgen.load(), *subject.model(None, None, None), extent["timed"])
-    try:
-        told = {"rounds": extent["rounds"], "progress": lambda name: progress(name, None)}
-        _, costs = timing.costs(opened, Look(), extent["tiers"], **told)
-    finally:
-        stages.release(opened)
+    if missing := tiers.missing():
+        return f"left out: {missing}"
+    costs = tiers.costs(extent["timed"], extent["tiers"], extent["rounds"], progress)
     rows = differences({cost.name: cost for cost in costs}, extent, progress)
     draw(folder, rows, extent)
     return words(rows)
@@ -115,10 +104,10 @@ def worst(rows: list[Row], view: str, tier: str) -> tuple[float, float]:
 
 def words(rows: list[Row]) -> str:
     """The main figures of the chart in a line."""
-    tiers = list(dict.fromkeys(row.tier for row in rows))
+    names = list(dict.fromkeys(row.tier for row in rows))
     each = []
     for view in VIEWS:
-        figures = (f"{tier} {mean:.2f} / {p95:.2f}" for tier in tiers for mean, p95 in [worst(rows, view, tier)])
+        figures = (f"{tier} {mean:.2f} / {p95:.2f}" for tier in names for mean, p95 in [worst(rows, view, tier)])
         each.append(f"{view} {', '.join(figures)}")
     return f"ΔE00 from a render, mean / p95 of the worst tone: {'; '.join(each)}"
 
@@ -144,30 +133,18 @@ def draw(folder: Path, rows: list[Row], extent: dict) -> None:
 
 
 def _panel(axes, rows: list[Row], figure: str, title: str) -> None:
-    tiers = list(dict.fromkeys(row.tier for row in rows))
-    ratio = {row.tier: row.ratio for row in rows}
-    most, top = max(ratio.values()), 1.15 * max(getattr(row, figure) for row in rows)
-    axes.set(xscale="log", xlim=(1.0, most * 1.12), ylim=(0, top), xlabel="frame time over a plain head's")
+    ratios = {row.tier: row.ratio for row in rows}
+    top = 1.15 * max(getattr(row, figure) for row in rows)
+    axes.set(ylim=(0, top))
     axes.set_title(title, color=INK, pad=26)
-    ticks = [v for v in ((1, 2, 5, 10, 20, 50) if most > 5 else (1, 1.5, 2, 3)) if v <= most * 1.12]
-    axes.set_xticks(ticks, [f"{v:g} ×" for v in ticks])
-    axes.xaxis.set_minor_formatter("")
-    axes.grid(axis="y")
-    axes.set_axisbelow(True)
-    places = drawing.apart([log10(ratio[tier]) for tier in tiers], 0.13 * log10(most * 1.12))
-    for tier, place in zip(tiers, places, strict=True):
-        axes.axvline(ratio[tier], color=drawing.RULE, linewidth=0.8, zorder=0)
-        axes.annotate(tier, (ratio[tier], top), (10**place, top * 1.035), color=GRAY, size=8.5, ha="center",
-                      annotation_clip=False, va="bottom",
-                      arrowprops={"arrowstyle": "-", "color": drawing.RULE, "linewidth": 0.8, "shrinkA": 0,
-                                  "shrinkB": 0})  # fmt: skip
+    tiers.axis(axes, ratios, top, top * 1.035)
     labels = []
     for k, view in enumerate(VIEWS):
-        x = [ratio[tier] for tier in tiers]
+        x = list(ratios.values())
         found = np.array(
-            [[getattr(row, figure) for row in rows if (row.view, row.tier) == (view, tier)] for tier in tiers]
+            [[getattr(row, figure) for row in rows if (row.view, row.tier) == (view, tier)] for tier in ratios]
         )
         axes.fill_between(x, found.min(axis=1), found.max(axis=1), color=HUES[k], alpha=0.12, linewidth=0)
         axes.plot(x, found.max(axis=1), linestyle=DASHES[k], color=HUES[k], marker=_MARKS[k], markersize=5.5)
         labels.append((float(found[-1].max()), f"{view}, {_MM_PER_PIXEL[view]:g} mm", HUES[k]))
-    drawing.label_ends(axes, most, labels, 0.06 * top)
+    drawing.label_ends(axes, max(x), labels, 0.06 * top)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from math import log10
 from pathlib import Path
 
 import lutgen
-from lutgen import extras, scene, subject
-from lutgen.charts import drawing
-from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
-from lutgen.errors import MachineError
-from lutgen.scene import Look
+from lutgen import extras, scene
+from lutgen.charts import drawing, tiers
+from lutgen.charts.drawing import DASHES, HUES, INK, inches
 
 LUT, BURLEY = "profile per pixel", "one Burley"
 SCALES = (0.05, 0.2, 0.5)
@@ -44,19 +41,10 @@ class Row:
 
 def viewing(folder: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> str:
     """The chart `viewing`; its main figures in words, or why it was left out: it needs OpenGL and the extra `view`."""
-    try:
-        extras.viewer("gl").context()
-        app = extras.viewer("app")
-    except MachineError as error:
-        return f"left out: {error}"
     extent = QUICK if quick else FULL
-    timing, stages = extras.viewer("timing"), extras.viewer("stages")
-    stage = app.open_stage(lutgen.load(), *subject.model(None, None, None), extent["size"])
-    try:
-        told = {"rounds": extent["rounds"], "progress": lambda name: progress(name, None)}
-        _, costs = timing.costs(stage, Look(), extent["tiers"], **told)
-    finally:
-        stages.release(stage)
+    if missing := tiers.missing():
+        return f"left out: {missing}"
+    costs = tiers.costs(extent["size"], extent["tiers"], extent["rounds"], progress)
     rows = errors(costs, extent, progress)
     draw(folder, rows, extras.viewer("gl").context().info["GL_RENDERER"], extent)
     return words(rows)
@@ -93,9 +81,9 @@ def errors(costs: list, extent: dict, progress: Callable = lambda stage, tally: 
 def words(rows: list[Row]) -> str:
     """The main figures of the chart in a line."""
     at = {(row.tier, row.profile): row for row in rows}
-    tiers = ", ".join(f"{row.tier} {row.ratio:.2f} × EE {max(_ee(row)):.2g}" for row in rows if row.profile == LUT)
+    each = ", ".join(f"{row.tier} {row.ratio:.2f} × EE {max(_ee(row)):.2g}" for row in rows if row.profile == LUT)
     burley = max(_ee(at["high", BURLEY]))
-    return f"frame over a plain head's, and worst EE difference: {tiers}; one Burley at high EE {burley:.2g}"
+    return f"frame over a plain head's, and worst EE difference: {each}; one Burley at high EE {burley:.2g}"
 
 
 def _ee(row: Row) -> tuple[float, float, float]:
@@ -125,26 +113,11 @@ def draw(folder: Path, rows: list[Row], renderer: str, extent: dict) -> None:
 
 def _panel(axes, rows: list[Row], curves: list, title: str, ends: tuple[float, float]) -> None:
     """Errors over cost: a solid line per curve with the skin's own profiles, a dashed one with one Burley."""
-    most = max(row.ratio for row in rows)
-    axes.set(xscale="log", yscale="log", xlim=(1.0, most * 1.12), ylim=ends, xlabel="frame time over a plain head's")
+    axes.set(yscale="log", ylim=ends)
     axes.set_title(title, color=INK, pad=26)
-    ticks = [v for v in (1, 2, 5, 10, 20, 50) if v <= most * 1.12] if most > 5 else [1, 1.5, 2, 3]
-    ticks = [v for v in ticks if v <= most * 1.12]
-    axes.set_xticks(ticks, [f"{v:g} ×" for v in ticks])
+    tiers.axis(axes, {row.tier: row.ratio for row in rows if row.profile == LUT}, ends[1], ends[1] * 1.32)
     axes.set_yticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
-    axes.xaxis.set_minor_formatter("")
     axes.yaxis.set_minor_formatter("")
-    axes.grid(axis="y")
-    axes.set_axisbelow(True)
-    own = [row for row in rows if row.profile == LUT]
-    for row in own:
-        axes.axvline(row.ratio, color=drawing.RULE, linewidth=0.8, zorder=0)
-    log_places = drawing.apart([log10(row.ratio) for row in own], 0.13 * log10(most * 1.12))
-    for row, place in zip(own, log_places, strict=True):
-        axes.annotate(row.tier, (row.ratio, ends[1]), (10**place, ends[1] * 1.32), color=GRAY, size=8.5, ha="center",
-                      annotation_clip=False, va="bottom",
-                      arrowprops={"arrowstyle": "-", "color": drawing.RULE, "linewidth": 0.8, "shrinkA": 0,
-                                  "shrinkB": 0})  # fmt: skip
     for profile, dash, face in ((LUT, DASHES[0], None), (BURLEY, DASHES[1], "white")):
         line, labels = [row for row in rows if row.profile == profile], []
         for k, (name, value) in enumerate(curves):
