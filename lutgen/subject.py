@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import color, environment, head, inversion, lighting, maps, mesh, painting
+from lutgen import color, environment, head, lighting, maps, mesh, painting
 from lutgen.errors import InputError
 from lutgen.lutset import LutSet
+from lutgen.mapping import inversion
 from lutgen.maps import Maps
 from lutgen.mesh import Mesh
 

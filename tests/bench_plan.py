@@ -13,11 +13,12 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from lutgen import judging, planning, prediction, verifying
+from lutgen import planning
 from lutgen.chromophores import EUMELANIN, HEMOGLOBIN, MELANIN
-from lutgen.explaining import Plan
-from lutgen.needs import VARIABLE, Needs, scene
 from lutgen.paths import PathTable
+from lutgen.planning import judging, prediction, verifying
+from lutgen.planning.explaining import Plan
+from lutgen.planning.needs import VARIABLE, Needs, scene
 from lutgen.tissue import PRESETS
 
 SEED, SCENES, REFERENCE_PHOTONS = 6, 20, 2**24

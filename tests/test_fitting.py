@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import least_squares as scipy_least_squares
 
 import lutgen
-from lutgen import color, fitting, least_squares, measured, nearest, uncertainty
+from lutgen import color, fitting
+from lutgen.fitting import least_squares, measured, nearest, uncertainty
 from lutgen.solvers import totals
 
 NM = np.arange(400.0, 701, 10)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import lutgen
-from lutgen import color, gamut, inversion, maps, subject
+from lutgen import color, maps, subject
+from lutgen.mapping import gamut, inversion
 from lutgen.maps import Maps
 
 SIDE = 96

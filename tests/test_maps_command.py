@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 import lutgen
-from lutgen import cli, color, exr, maps, mapset, pictures
+from lutgen import cli, color, exr, maps, pictures
+from lutgen.mapping import mapset
 from lutgen.tissue import PRESETS
 
 SIDE = 128

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import lutgen
-from lutgen import color, measured
+from lutgen import color
+from lutgen.fitting import measured
 
 HEAD = "wavelength_nm,reflectance\n"
 

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lutgen import exr, maps, needs
+from lutgen import exr, maps
 from lutgen.chromophores import EUMELANIN, HEMOGLOBIN, MELANIN, OXYGENATION
 from lutgen.errors import InputError
-from lutgen.needs import Needs, scene
+from lutgen.planning import needs
+from lutgen.planning.needs import Needs, scene
 from lutgen.tissue import preset
 
 

@@ -11,24 +11,12 @@ import bench_plan
 import numpy as np
 import pytest
 
-from lutgen import (
-    baking,
-    cli,
-    config,
-    costs,
-    expansion,
-    judging,
-    pilot,
-    planning,
-    prediction,
-    profiles,
-    quadrature,
-    verifying,
-)
+from lutgen import baking, cli, config, expansion, planning, profiles, quadrature
 from lutgen.axes import default_grid
 from lutgen.config import Recipe
 from lutgen.errors import InputError
-from lutgen.needs import scene
+from lutgen.planning import costs, judging, pilot, prediction, verifying
+from lutgen.planning.needs import scene
 from lutgen.solvers import path_table, totals
 
 SKIN = Recipe().skin
@@ -335,7 +323,7 @@ def test_random_scenes_hold_as_predicted(few_draws):
 
 def test_the_search_is_the_same_every_time_and_needs_no_opencl(middling):
     code = (
-        "import sys; from lutgen import config, needs, planning;"
+        "import sys; from lutgen import config, planning; from lutgen.planning import needs;"
         "found = planning.plan(needs.scene('light,dark'));"
         "bad = {'pyopencl', 'colour', 'scipy', 'matplotlib'} & set(sys.modules);"
         "print(config.toml(found.recipe)) if not bad else sys.exit(str(bad))"

@@ -138,9 +138,8 @@ def _panel(axes, rows: list[Row], figure: str, title: str) -> None:
     axes.set(ylim=(0, top))
     axes.set_title(title, color=INK, pad=26)
     tiers.axis(axes, ratios, top, top * 1.035)
-    labels = []
+    labels, x = [], list(ratios.values())
     for k, view in enumerate(VIEWS):
-        x = list(ratios.values())
         found = np.array(
             [[getattr(row, figure) for row in rows if (row.view, row.tier) == (view, tier)] for tier in ratios]
         )

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 import lutgen
-from lutgen import albedo, balance, folders, inversion, maps, mapset, retarget
+from lutgen import folders, maps
 from lutgen.commands import Outcome
 from lutgen.errors import InputError, in_range, one_of
 from lutgen.lutset import LutSet
+from lutgen.mapping import albedo, balance, inversion, mapset, retarget
 from lutgen.progress import Progress
 from lutgen.tissue import PRESETS
 
@@ -128,7 +129,7 @@ def _facts(
 
 
 def _preview(path: Path, luts: LutSet, balanced, found, made, facts: dict, recolored) -> None:
-    from lutgen import map_preview
+    from lutgen.mapping import sheet
 
     left = facts["residual"]
     words = (
@@ -137,7 +138,7 @@ def _preview(path: Path, luts: LutSet, balanced, found, made, facts: dict, recol
         f"out of reach {left['out_of_reach_share']:.1%}"
     )
     name = facts["target"]["named"] if facts["target"] else ""
-    map_preview.draw(luts, balanced, found, made, words, recolored, name).save(path, compress_level=3)
+    sheet.draw(luts, balanced, found, made, words, recolored, name).save(path, compress_level=3)
 
 
 def _text(result: dict, options: Namespace) -> str:

@@ -8,11 +8,12 @@ from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
 
-from lutgen import config, costs, planning
+from lutgen import config, planning
 from lutgen.commands import Outcome
 from lutgen.errors import InputError, cannot_write
-from lutgen.explaining import Plan
-from lutgen.needs import Needs, scene
+from lutgen.planning import costs
+from lutgen.planning.explaining import Plan
+from lutgen.planning.needs import Needs, scene
 from lutgen.progress import Progress
 
 STATISTIC = (
@@ -88,7 +89,7 @@ def _lines(found: Plan) -> list[str]:
 
 def _verified(found: Plan, progress: Progress, device: str | None) -> dict:
     """The recipe baked with eight seeds, and what it errs by."""
-    from lutgen import verifying
+    from lutgen.planning import verifying
 
     needs, recipe = found.needs, found.recipe
     progress("reference", None)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from lutgen import color
 from lutgen.commands import Outcome
 from lutgen.errors import InputError, cannot_write, one_of
-from lutgen.measured import GRAMMAR
+from lutgen.fitting.measured import GRAMMAR
 
 if TYPE_CHECKING:
     from lutgen.fitting import Fit
@@ -80,7 +80,8 @@ def _draw(options: Namespace, picture: Callable) -> None:
 
 def fit(options: Namespace) -> Outcome:
     """`lutgen fit`: the skin of a measured spectrum or color."""
-    from lutgen import fitting, measured
+    from lutgen import fitting
+    from lutgen.fitting import measured
     from lutgen.tissue import Skin
 
     if options.measured is None:

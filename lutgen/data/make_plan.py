@@ -20,10 +20,11 @@ import numpy as np
 from scipy.optimize import nnls
 
 import lutgen
-from lutgen import baking, config, exr, extras, pilot, quadrature
+from lutgen import baking, config, exr, extras, quadrature
 from lutgen import device as ocl
 from lutgen.axes import default_grid
 from lutgen.config import Recipe
+from lutgen.planning import pilot
 
 WAVELENGTHS, PHOTONS, SEED = 10, 2**22, 1000
 SCALES_MM = (0.05, 0.1, 0.2, 0.5, 1.0)

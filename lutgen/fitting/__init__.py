@@ -13,10 +13,11 @@ from itertools import combinations
 
 import numpy as np
 
-from lutgen import color, least_squares, measured, nearest, uncertainty
+from lutgen import color
 from lutgen.errors import InputError, in_range, one_of, shown
-from lutgen.measured import Measured
-from lutgen.nearest import CUBE_ROOT, PARAMETERS, Problem
+from lutgen.fitting import least_squares, measured, nearest, uncertainty
+from lutgen.fitting.measured import Measured
+from lutgen.fitting.nearest import CUBE_ROOT, PARAMETERS, Problem
 from lutgen.tissue import REFRACTIVE_INDEX, Skin
 
 OF_SPECTRUM, OF_COLOR = ("melanin", "hemoglobin", "oxygenation"), ("melanin", "hemoglobin")

@@ -8,11 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from lutgen import costs, prediction, quadrature
+from lutgen import quadrature
 from lutgen.axes import Axis, Grid
 from lutgen.config import Recipe
-from lutgen.needs import Needs
-from lutgen.prediction import Colors, Profiles
+from lutgen.planning import costs, prediction
+from lutgen.planning.needs import Needs
+from lutgen.planning.prediction import Colors, Profiles
 
 AXES = ("melanin", "eumelanin", "hemoglobin")
 LEEWAY = 1.1

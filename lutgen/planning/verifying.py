@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lutgen import baking, color, expansion, pilot, prediction, profiles, quadrature
+from lutgen import baking, color, expansion, profiles, quadrature
 from lutgen import device as ocl
 from lutgen.config import Recipe
 from lutgen.lutset import LutSet
-from lutgen.needs import Needs
 from lutgen.paths import PathTable
-from lutgen.prediction import BAKES, p95
+from lutgen.planning import pilot, prediction
+from lutgen.planning.needs import Needs
+from lutgen.planning.prediction import BAKES, p95
 from lutgen.solvers import totals
 
 COLOR_SKINS, PROFILE_SKINS, SKINS_SEED = 2000, 200, 7

@@ -1,7 +1,7 @@
 """Painted color to pigment: which melanin and hemoglobin a color LUT would need for each texel of an albedo.
 
-*Balance*: one gain per channel, for paint is seldom white-balanced (lutgen.balance). *Solution*: the skin nearest to
-each texel's color (lutgen.gamut). *Blotches*: dark skin hardly shows its blood, so noise would become blotches. The
+*Balance*: one gain per channel, for paint is seldom white-balanced (balance). *Solution*: the skin nearest to
+each texel's color (gamut). *Blotches*: dark skin hardly shows its blood, so noise would become blotches. The
 albedo's low frequencies are therefore solved first, and each texel is held to that solution as strongly as the color
 alone says little. What is left in the low frequencies is mostly baked light; ratio maps may keep only a share of it.
 
@@ -15,10 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
-from lutgen import balance, color, gamut, maps
+from lutgen import color, maps
 from lutgen.errors import InputError, in_range, numbers
-from lutgen.gamut import Surface
 from lutgen.lutset import LutSet
+from lutgen.mapping import balance, gamut
+from lutgen.mapping.gamut import Surface
 
 LOW_KEPT = (0.2, 0.55)
 """Share of the low frequencies of log melanin and log hemoglobin that ratio maps keep."""

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from lutgen import color, gamut
-from lutgen.gamut import Surface
-from lutgen.inversion import Inversion
+from lutgen import color
 from lutgen.lutset import LutSet
+from lutgen.mapping import gamut
+from lutgen.mapping.gamut import Surface
+from lutgen.mapping.inversion import Inversion
 
 _FACTOR = (0.05, 8.0)
 """Least and most that what the LUT does not explain may multiply a channel by."""

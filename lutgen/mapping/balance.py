@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lutgen import gamut
-from lutgen.gamut import Surface
 from lutgen.lutset import LutSet
+from lutgen.mapping import gamut
+from lutgen.mapping.gamut import Surface
 
 TINT, EXPOSURE = 0.2, 0.5
 """How far from 1, in logarithm, the gain of a channel and of all three lie as readily as texels lie off by half a

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from lutgen import color, gamut
-from lutgen.inversion import Inversion
+from lutgen import color
 from lutgen.lutset import LutSet
-from lutgen.mapset import REACH, Layer
+from lutgen.mapping import gamut
+from lutgen.mapping.inversion import Inversion
+from lutgen.mapping.mapset import REACH, Layer
 from lutgen.paper import GRAY, INK, OVERSAMPLE, RULE, Sheet
 
 WIDTH, SIDE, GAP, TOP = 1200, 368, 24, 104

@@ -8,16 +8,16 @@ the nodes of one axis. Of the least recipes it is the one whose bake takes the f
 
 from __future__ import annotations
 
-from lutgen import explaining, judging, search
 from lutgen.errors import InputError
-from lutgen.explaining import Plan
-from lutgen.needs import Needs
+from lutgen.planning import explaining, judging, search
+from lutgen.planning.explaining import Plan
+from lutgen.planning.needs import Needs
 
 
 def plan(needs: Needs) -> Plan:
     """The least recipe that holds; InputError where none does, or none for so few bytes or seconds.
 
-    >>> from lutgen.needs import scene
+    >>> from lutgen.planning.needs import scene
     >>> plan(scene("light", tolerance=1.0)).recipe.color.shape
     (1, 1, 1)
     """

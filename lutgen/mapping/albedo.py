@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import balance, color, gamut, pictures
+from lutgen import color, pictures
 from lutgen.errors import InputError, one_of
-from lutgen.inversion import UNPAINTED, checked, ratios_of
 from lutgen.lutset import LutSet
+from lutgen.mapping import balance, gamut
+from lutgen.mapping.inversion import UNPAINTED, checked, ratios_of
 from lutgen.tissue import PRESETS
 
 ENCODINGS = ("srgb", "linear")

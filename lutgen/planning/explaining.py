@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lutgen import costs, judging, quadrature, search
+from lutgen import quadrature
 from lutgen.axes import Grid
 from lutgen.config import Recipe
 from lutgen.errors import InputError
-from lutgen.judging import Judge
-from lutgen.needs import EE_TOLERANCE, TOLERANCE, Needs
+from lutgen.planning import costs, judging, search
+from lutgen.planning.judging import Judge
+from lutgen.planning.needs import EE_TOLERANCE, TOLERANCE, Needs
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from lutgen import prediction, quadrature
+from lutgen import quadrature
 from lutgen.axes import Grid
 from lutgen.config import RINGS, Recipe
-from lutgen.judging import AXES, LEEWAY, PHOTONS, SPACINGS, Judge, axis_of, middles, resized
-from lutgen.needs import Needs
+from lutgen.planning import prediction
+from lutgen.planning.judging import AXES, LEEWAY, PHOTONS, SPACINGS, Judge, axis_of, middles, resized
+from lutgen.planning.needs import Needs
 
 COLOR_MARGIN = 0.97
 """Share of the tolerance that predicted colors may take: another 1,500 skins differ by so much in their percentile."""

@@ -15,8 +15,9 @@ from itertools import product
 
 import numpy as np
 
-from lutgen import chromophores, color, least_squares
-from lutgen.measured import Measured, color_weights
+from lutgen import chromophores, color
+from lutgen.fitting import least_squares
+from lutgen.fitting.measured import Measured, color_weights
 from lutgen.solvers import totals
 from lutgen.tissue import Skin
 
@@ -82,7 +83,7 @@ class Problem:
 def problem(data: Measured, names: tuple[str, ...], base: Skin, offset: float = 0.0) -> Problem:
     """Fit these parameters to the data; all else is `base`'s.
 
-    >>> from lutgen import measured
+    >>> from lutgen.fitting import measured
     >>> problem(measured.read("#c09580"), ("melanin",), Skin(0.02, 0.7, 0.01)).low.round(6).tolist()
     [0.1]
     """
@@ -97,7 +98,7 @@ def problem(data: Measured, names: tuple[str, ...], base: Skin, offset: float = 
 def solve(task: Problem) -> np.ndarray:
     """The best point [P] of descents from the best cells of a coarse table that lie apart.
 
-    >>> from lutgen import measured
+    >>> from lutgen.fitting import measured
     >>> task = problem(measured.read("#b98c74"), ("melanin", "hemoglobin"), Skin(0.02, 0.7, 0.01))
     >>> {name: round(float(value[0]), 4) for name, value in task.values(solve(task)[None]).items()}
     {'melanin': 0.0194, 'hemoglobin': 0.0157}

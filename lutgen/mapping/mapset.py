@@ -14,10 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr, inversion, maps, pictures
+from lutgen import exr, maps, pictures
 from lutgen.axes import Axis
-from lutgen.inversion import Inversion
 from lutgen.lutset import LutSet
+from lutgen.mapping import inversion
+from lutgen.mapping.inversion import Inversion
 
 FORMATS = ("png", "exr")
 REACH = 5.0

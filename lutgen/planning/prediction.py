@@ -12,9 +12,10 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from lutgen import chromophores, color, expansion, pilot, profiles, quadrature
+from lutgen import chromophores, color, expansion, profiles, quadrature
 from lutgen.axes import Grid
-from lutgen.needs import Needs, panel
+from lutgen.planning import pilot
+from lutgen.planning.needs import Needs, panel
 from lutgen.solvers import totals
 from lutgen.tissue import REFRACTIVE_INDEX, Skin
 

@@ -1,0 +1,1 @@
+"""From a painted albedo to maps of melanin and hemoglobin, by inverting the color LUT."""
