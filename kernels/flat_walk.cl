@@ -1,5 +1,5 @@
 // The walk of path_table.cl over a queue of entries: each starts as its entry's direction says, in the frame of its
-// normal, under flat skin; what leaves is put back into the world. Comments on the step stand there.
+// normal, under flat skin; what leaves is put back into the world.
 
 __kernel void flat_walk(__global const job_t *jobs, __global const entry_t *entries, __global exit_t *exits,
                         __global result_t *results) {
@@ -19,24 +19,16 @@ __kernel void flat_walk(__global const job_t *jobs, __global const entry_t *entr
 
     for (uint step = 0; step < job.max_steps; step++) {
         events += running;
-        vf s = exponential(next_bits(&rng), mean_step), cosine, p, q;
-        draw_turn(&rng, hg, &cosine, &p, &q);
-        vf steep = GREATER(fabs(uz), (vf)(1e-9f)), around = 1.0f + steep, inverse = 1.0f / (steep * around);
-        vf per_depth = inverse * around;
-
-        vf z1 = fma(uz, s, z), clipped = LESSER(GREATER(z1, (vf)(-thickness)), (vf)(thickness));
-        L += s;
-        x = fma(ux, s, x);
-        y = fma(uy, s, y);
-        vf in_epidermis = fabs(clipped - shallow) * per_depth;
-        Le += LESSER(in_epidermis, s);
-        shallow = fabs(clipped);
-        z = fabs(z1);
-        uz = AS_VF(AS_VU(uz) ^ (AS_VU(z1) & SIGN_BIT));
-        vi hit = MASK(z1 < 0.0f) & MASK(steep > critical), ended = MASK(L > life);
+        vf s = exponential(next_bits(&rng), mean_step), random = next_signed(&rng), p, q;
+        vf cosine = hg_cosine(hg, random, 1.0f / hg_denominator(hg, random));
+        uniform_turn(next_bits(&rng), cosine, &p, &q);
+        const slope_t slope = slope_of(uz);
+        vi hit = advance(s, slope, thickness, ux, uy, &uz, &x, &y, &z, &L, &Le, &shallow);
+        hit &= MASK(slope.steep > critical);
+        vi ended = MASK(L > life);
         if (ANY(hit | ended)) {
-            vf beyond = z * per_depth;
-            vi leaves = hit & ~reflects(next_uniform(&rng), steep, n) & MASK(L - beyond <= life);
+            vf beyond = z * slope.per_depth;
+            vi leaves = hit & ~reflects(next_uniform(&rng), slope.steep, n) & MASK(L - beyond <= life);
             ended |= leaves;
             const uint left = bits(leaves);
             uint gone = bits(ended);
@@ -45,7 +37,7 @@ __kernel void flat_walk(__global const job_t *jobs, __global const entry_t *entr
                 STORE(fma(-ux, beyond, x), radius_x);
                 STORE(fma(-uy, beyond, y), radius_y);
                 STORE(L - beyond, path);
-                STORE(fmax(Le - shallow * per_depth, (vf)(0.0f)), path_e);
+                STORE(fmax(Le - shallow * slope.per_depth, (vf)(0.0f)), path_e);
                 STORE(ux, to_x);
                 STORE(uy, to_y);
                 STORE(uz, to_z);
@@ -100,7 +92,7 @@ __kernel void flat_walk(__global const job_t *jobs, __global const entry_t *entr
                 q = SELECT(q, zero, ended);
             }
         }
-        turn(&ux, &uy, &uz, cosine, p, q, inverse * steep);
+        turn(&ux, &uy, &uz, cosine, p, q, slope.inverse);
     }
     end_job(&job, entries, exits, slots, &taken, results + id, escaped, entered, events);
 }

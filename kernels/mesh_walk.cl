@@ -54,29 +54,22 @@ __kernel void mesh_walk(__global const job_t *jobs, __global const entry_t *entr
 
     for (uint step = 0; step < job.max_steps; step++) {
         events += running;
-        vf s = exponential(next_bits(&rng), mean_step), cosine, p, q, h = at.z - at.middle;
-        draw_turn(&rng, hg, &cosine, &p, &q);
+        vf s = exponential(next_bits(&rng), mean_step), random = next_signed(&rng), p, q, h = at.z - at.middle;
+        vf cosine = hg_cosine(hg, random, 1.0f / hg_denominator(hg, random));
+        uniform_turn(next_bits(&rng), cosine, &p, &q);
         vf along = fma(at.ux, at.x, fma(at.uy, at.y, at.uz * h));
         vf off = at.room - fma(at.x, at.x, fma(at.y, at.y, h * h));
         vf reach = sqrt(GREATER(fma(along, along, off), (vf)(0.0f))) - along;
         vi cut = MASK(reach < s);
         s = LESSER(reach, s);
 
-        vf steep = GREATER(fabs(at.uz), (vf)(1e-9f)), around = 1.0f + steep, inverse = 1.0f / (steep * around);
-        vf per_depth = inverse * around;
-        vf z1 = fma(at.uz, s, at.z), clipped = LESSER(GREATER(z1, (vf)(-thickness)), (vf)(thickness));
-        L += s;
-        at.x = fma(at.ux, s, at.x);
-        at.y = fma(at.uy, s, at.y);
-        vf in_epidermis = fabs(clipped - shallow) * per_depth;
-        Le += LESSER(in_epidermis, s);
-        shallow = fabs(clipped);
-        at.z = fabs(z1);
-        at.uz = AS_VF(AS_VU(at.uz) ^ (AS_VU(z1) & SIGN_BIT));
-        vi hit = MASK(z1 < 0.0f) & MASK(steep > critical), ended = MASK(L > life);
+        const slope_t slope = slope_of(at.uz);
+        vi hit = advance(s, slope, thickness, at.ux, at.uy, &at.uz, &at.x, &at.y, &at.z, &L, &Le, &shallow);
+        hit &= MASK(slope.steep > critical);
+        vi ended = MASK(L > life);
         if (ANY(hit | ended | cut)) {
-            vf beyond = at.z * per_depth;
-            vi leaves = hit & ~reflects(next_uniform(&rng), steep, n) & MASK(L - beyond <= life);
+            vf beyond = at.z * slope.per_depth;
+            vi leaves = hit & ~reflects(next_uniform(&rng), slope.steep, n) & MASK(L - beyond <= life);
             ended |= leaves;
             cut &= ~ended;
             const uint left = bits(leaves);
@@ -95,7 +88,7 @@ __kernel void mesh_walk(__global const job_t *jobs, __global const entry_t *entr
                 STORE(fma(-at.ux, beyond, at.x), exit_x);
                 STORE(fma(-at.uy, beyond, at.y), exit_y);
                 STORE(L - beyond, lanes[PATH]);
-                STORE(fmax(Le - shallow * per_depth, zero), lanes[PATH_E]);
+                STORE(fmax(Le - shallow * slope.per_depth, zero), lanes[PATH_E]);
                 STORE(SELECT(life, LIFE, ended), lanes[LIVES]);
                 STORE(at.x, lanes[X]);
                 STORE(at.y, lanes[Y]);

@@ -17,11 +17,6 @@
 #define RECORD 3
 #endif
 
-// How long the photon of a lane lives, mm. Charts build the walk with another definition, to compare.
-#ifndef LIFE
-#define LIFE exponential(next_bits(&rng), mean_life)
-#endif
-
 // Lanes without a photon wait where nothing happens: far below, with no end of life.
 inline void park(vf *z, vf *life, uint set) {
     float depths[W], lives[W];
@@ -52,27 +47,14 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
         events += running;
         vf s = exponential(next_bits(&rng), mean_step), random = next_signed(&rng), p, q;
         vf cosine = hg_cosine(hg, random, 1.0f / hg_denominator(hg, random));
-        vf sine = sqrt(fma(-cosine, cosine, (vf)(1.0f)));
-        uniform_azimuth(next_bits(&rng), &p, &q);
-        p *= sine;
-        q *= sine;
-        // One division serves 1/|uz| and 1/(1 + |uz|): it is the slowest unit here.
-        vf steep = GREATER(fabs(uz), (vf)(1e-9f)), around = 1.0f + steep, inverse = 1.0f / (steep * around);
-        vf per_depth = inverse * around;
-
-        vf z1 = fma(uz, s, z), clipped = LESSER(GREATER(z1, (vf)(-thickness)), (vf)(thickness));
-        L += s;
-        x = fma(ux, s, x);
-        y = fma(uy, s, y);
-        vf in_epidermis = fabs(clipped - shallow) * per_depth;
-        Le += LESSER(in_epidermis, s);
-        shallow = fabs(clipped);
-        z = fabs(z1);
-        uz = AS_VF(AS_VU(uz) ^ (AS_VU(z1) & SIGN_BIT));
-        vi hit = MASK(z1 < 0.0f) & MASK(steep > critical), ended = MASK(L > life);
+        uniform_turn(next_bits(&rng), cosine, &p, &q);
+        const slope_t slope = slope_of(uz);
+        vi hit = advance(s, slope, thickness, ux, uy, &uz, &x, &y, &z, &L, &Le, &shallow);
+        hit &= MASK(slope.steep > critical);
+        vi ended = MASK(L > life);
         if (ANY(hit | ended)) {
-            vf beyond = z * per_depth;
-            vi leaves = hit & ~reflects(next_uniform(&rng), steep, n) & MASK(L - beyond <= life);
+            vf beyond = z * slope.per_depth;
+            vi leaves = hit & ~reflects(next_uniform(&rng), slope.steep, n) & MASK(L - beyond <= life);
             ended |= leaves;
             uint left = bits(leaves), gone = bits(ended), count = popcount(gone);
             float radius[W], path[W], path_e[W], azimuth[W];
@@ -81,7 +63,7 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
             STORE(r, radius);
             if (RECORD == 4) STORE(xo / GREATER(r, (vf)(1e-20f)), azimuth);
             STORE(L - beyond, path);
-            STORE(fmax(Le - shallow * per_depth, (vf)(0.0f)), path_e);
+            STORE(fmax(Le - shallow * slope.per_depth, (vf)(0.0f)), path_e);
             do {  // without a test before the first lap: if no lane left, the next record overwrites it
                 uint i = lowest_bit(left | SIGN_BIT) % W;
                 out[RECORD * escaped] = radius[i];
@@ -114,7 +96,7 @@ __kernel void walk(__global const job_t *jobs, __global float *bank, __global re
             }
             launched += count;
         }
-        turn(&ux, &uy, &uz, cosine, p, q, inverse * steep);
+        turn(&ux, &uy, &uz, cosine, p, q, slope.inverse);
     }
     results[id].escaped = escaped;
     results[id].unfinished = running;

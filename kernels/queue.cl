@@ -1,9 +1,6 @@
-// What both walks over a queue share (lutgen/render/walks.py): where the next entry lies, and what a step draws.
+// What both walks over a queue share (lutgen/render/walks.py): where the next entry lies, and what leaves.
 // A job walks the entries first, first + stride, ... of one wavelength; an exit lies where its entry lay.
 #define EMPTY 0xffffffffu
-
-// How long the photon of a lane lives, mm (path_table.cl).
-#define LIFE exponential(next_bits(&rng), mean_life)
 
 inline void no_exit(__global exit_t *out) { out->path_epidermis_mm = out->path_dermis_mm = -1.0f; }
 
@@ -15,16 +12,6 @@ inline uint next_entry(const job_t *job, __global const entry_t *entries, __glob
         no_exit(exits + slot);
     }
     return EMPTY;
-}
-
-// Cosine of the scattering angle, and its sine times the direction of the azimuth.
-inline void draw_turn(rng_t *rng, hg_t hg, vf *cosine, vf *p, vf *q) {
-    vf random = next_signed(rng);
-    *cosine = hg_cosine(hg, random, 1.0f / hg_denominator(hg, random));
-    vf sine = sqrt(fma(-*cosine, *cosine, (vf)(1.0f)));
-    uniform_azimuth(next_bits(rng), p, q);
-    *p *= sine;
-    *q *= sine;
 }
 
 // Refracted into air: the part of a direction along the surface times n, the rest along the outward normal.

@@ -23,7 +23,7 @@ ROUNDS = 5
 _WAVELENGTHS_NM = np.array([460.0, 550.0, 640.0])
 _PHOTONS = {"lanes": 196_608, "one lane": 24_576}
 FLOPS_PER_EVENT = 72
-"""Floating-point operations of one step in kernels/path_table.cl outside its branch, a multiply-add counted as two."""
+"""Floating-point operations of one step of kernels/path_table.cl outside its branch, a multiply-add counted as two."""
 _CHAINS, _PEAK_ROUNDS, _PEAK_ITEMS = 12, 200_000, 64
 
 

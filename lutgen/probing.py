@@ -23,7 +23,7 @@ def evaluate(expression: str, *inputs: np.ndarray, lanes: int = 16, outputs: int
     parameters = ", ".join(f"__global const float *in_{name}" for name in names)
     loads = "".join(f"vf {name} = LOAD(in_{name} + i * W);\n" for name in names)
     stores = "".join(f"STORE(out[{k}], result + {k} * {count} + i * W);\n" for k in range(outputs))
-    text = ocl.source("lanes", "rng", "optics") + (
+    text = ocl.source("lanes", "rng", "optics", "step") + (
         "inline vu mix_lanes(vu x) { x ^= x >> 16; x *= 0x7feb352du; x ^= x >> 15; x *= 0x846ca68bu; "
         "return x ^ (x >> 16); }\n"
         f"__kernel void probe({parameters}, __global float *result) {{\n"

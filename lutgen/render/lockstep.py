@@ -53,7 +53,11 @@ def block(device: ocl.Device) -> int:
 def kernel(device: ocl.Device, inside: bool, before: str = ""):
     """The built kernel of either walk; `before` are definitions that replace its own."""
     structs, names = (*_STRUCTS, distance.STRUCT), ("depth", "anchors", "mesh_walk") if inside else ("flat_walk",)
-    text = before + ocl.struct_source(device, structs) + ocl.source("lanes", "rng", "optics", "frame", "queue", *names)
+    text = (
+        before
+        + ocl.struct_source(device, structs)
+        + ocl.source("lanes", "rng", "optics", "step", "frame", "queue", *names)
+    )
     return ocl.kernel(device, names[-1], text, {"W": device.lanes})
 
 

@@ -71,7 +71,7 @@ def block_photons(device: ocl.Device) -> int:
 
 def walk_kernel(device: ocl.Device, life: str = "", record: int = 3):
     """The built kernel of kernels/path_table.cl; `life` replaces its LIFE, `record` 4 adds azimuths."""
-    text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "path_table")
+    text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "step", "path_table")
     text = f"#define LIFE {life}\n{text}" if life else text
     return ocl.kernel(
         device, "walk", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device), "RECORD": record}
@@ -87,7 +87,7 @@ def tabulate_kernel(device: ocl.Device, rings: int, slices: int, nodes: tuple[in
 
 def kernel_hash(device: ocl.Device) -> str:
     """Short hash of everything the trace's numbers depend on: kernel text, structs, lanes and block size."""
-    text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "path_table", "tabulate")
+    text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "step", "path_table", "tabulate")
     return hashlib.sha256(f"{device.lanes} {block_photons(device)} {NODES_E} {NODES_D} {text}".encode()).hexdigest()[
         :16
     ]
