@@ -136,8 +136,9 @@ def _panel(axes, rows: list[Row], figure: str, title: str) -> None:
     ratios = {row.tier: row.ratio for row in rows}
     top = 1.15 * max(getattr(row, figure) for row in rows)
     axes.set(ylim=(0, top))
-    axes.set_title(title, color=INK, pad=26)
-    tiers.axis(axes, ratios, top, top * 1.035)
+    axes.set_title(title, color=INK, pad=36)
+    names = {f"{row.tier}\n{row.milliseconds:.0f} ms": row.ratio for row in rows}
+    tiers.axis(axes, names, top, top * 1.035)
     labels, x = [], list(ratios.values())
     for k, view in enumerate(VIEWS):
         found = np.array(
