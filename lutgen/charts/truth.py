@@ -24,7 +24,7 @@ VIEWS = {
 _MM_PER_PIXEL = {"portrait": 1.3, "close-up": 0.13}
 QUICK = {"tiers": ("off", "medium", "high"), "side": 96, "samples": 32, "rounds": 1, "timed": (320, 180),
          "tones": {"portrait": ("light",), "close-up": ("light",)}}  # fmt: skip
-FULL = {"tiers": scene.TIERS, "side": 192, "samples": 32, "rounds": 3, "timed": (640, 360),
+FULL = {"tiers": scene.TIERS, "side": 192, "samples": 128, "rounds": 3, "timed": (640, 360),
         "tones": {"portrait": ("very-light", "light", "intermediate", "tan", "brown", "dark"),
                   "close-up": ("very-light", "dark")}}  # fmt: skip
 _WIDE, _HIGH = 13.4, 6.3
