@@ -210,6 +210,37 @@ def test_all_wavelengths_of_a_queue_give_the_sets_color():
     assert agree(found, Estimate(wanted, luts.color_std_error(*skin)))
 
 
+@pytest.mark.parametrize("preset", ["light", "dark"])
+@pytest.mark.parametrize("inside", [False, True])
+def test_full_walks_have_the_profile_of_the_set(inside, preset):
+    """Energy of every ring of the set's profiles, under flat skin or inside a thick slab, and within every radius; by
+    reciprocity what a camera along the normal sees of a small disc under light from a whole hemisphere."""
+    luts, skin = lutgen.load(), lutgen.preset(preset)
+    edges, nm, weight = luts.paths.radius_edges_mm, luts.paths.wavelength_nm, luts.weights
+    through, _ = baking.skin_medium(skin, nm)
+    K, count = len(nm), 2**17
+    exits, tally = walked(entries(count * K), through, slab(40.0, 120.0, 0.5) if inside else None)
+    assert tally.unfinished == 0
+    assert tally.lost < 1e-5 * count * K
+    mu = expansion.coefficients(
+        nm, luts.absorbers, *(np.array([getattr(skin, name)]) for name in ("melanin", "eumelanin", "hemoglobin"))
+    )
+    exits = exits.reshape(count, K)
+    w = weights(exits, mu[0][:, 0], mu[1][:, 0], through.nu_per_mm) * through.entry
+    where = np.stack([radius(exits[:, k]) for k in range(K)], axis=1)
+    sums, squares = (
+        np.stack([np.histogram(where[:, k], edges, weights=w[:, k] ** power)[0] / count for k in range(K)], axis=1)
+        for power in (1, 2)
+    )
+    sigma = np.sqrt(np.maximum(squares - sums**2, 0) / count @ weight**2)
+    wanted = luts.paths.evaluate(*mu)[:, :, 0].T @ weight
+    of_paths = np.sqrt((luts.paths.std_error(*mu)[:, :, 0] ** 2).T @ weight**2)
+    whole, off = np.hypot(sigma, of_paths), sums @ weight - wanted
+    assert np.all(np.abs(off) < 4 * whole + 1e-7)
+    assert np.all(np.abs(np.cumsum(off, axis=0)) < 4 * np.sqrt(np.cumsum(whole**2, axis=0)) + 1e-6)
+    assert np.sqrt(np.sum(whole**2, axis=0)).max() < 0.01 * wanted.sum(axis=0).max()  # else the law says little
+
+
 def test_exits_do_not_depend_on_how_a_picture_was_cut():
     """Blocks of pixels, estimates and turns have streams of their own; empty places have no exit."""
     device = ocl.choose()
