@@ -40,6 +40,10 @@ inline float3 radiance(const scene_t *s, const exits_t *exits, hit_t hit, float3
         }
         tally[BOUNCES]++;
         here = surface_at(s, path.hit);
+        start_t unseen;
+        float3 color = 0.0f;
+        for (int k = 0; k < WAVES; k++) color += share[k] * color_weight(s, k);
+        light += path.tint * color * reflected(s, &here, path.direction, &unseen, rng, tally);
     }
 }
 

@@ -1,9 +1,10 @@
 // What is kept of a pixel's samples: sums of R, G, B and of hits, and of the products RR, GG, BB, RG, RB, GB, from which
-// the host has mean and covariance. A sample that is not finite is counted and left out, so no pixel becomes NaN.
+// the host has mean and covariance. A sample that is not finite, or its square, is counted and left out, so no pixel
+// becomes NaN.
 #define MOMENTS 10
 
 inline void add_sample(__global float *sums, float3 color, float hits, uint *tally) {
-    if (!all(isfinite(color))) {
+    if (!isfinite(dot(color, color))) {
         tally[BROKEN]++;
         color = 0.0f;
     }

@@ -1,6 +1,6 @@
 // What both ways to a picture share: what the surface reflects, and the light where a walk leaves the skin. Light that
-// skin reflects onto skin is followed: where a ray into the surroundings, or the mirrored one, meets the head, a walk
-// starts anew there.
+// skin sends onto skin is followed: where a ray into the surroundings, or the mirrored one, meets the head, a walk
+// starts anew there, and what the surface there reflects of sun and surroundings counts too.
 
 // A walk's start: a hit (triangle -1: none), the direction that it is seen along, and how much of its light counts.
 typedef struct {

@@ -97,6 +97,7 @@ __kernel void gather(SCENE, uint begin, uint end, uint first, uint samples, uint
         __global const exit_t *left = exits + slot;
         const hit_t hit = {sample->triangle, 0.0f, sample->u, sample->v};
         start_t next = {{-1, 0, 0, 0}, 0.0f, view3(sample->tint)};
+        rng_t rng = stream(s, begin + slot / samples, first + slot % samples, round + 1);
         entry->sample = EMPTY;
         if (left->path_dermis_mm >= 0.0f) {
             const surface_t here = surface_at(s, hit);
@@ -105,7 +106,6 @@ __kernel void gather(SCENE, uint begin, uint end, uint first, uint samples, uint
             float2 rate = 0.5f * (absorption(s, k, view3(sample->skin)) + absorption(s, k, there.skin));
             float length = rate.x * left->path_epidermis_mm + rate.y * left->path_dermis_mm;
             sample->share *= ENTRY * exp_lanes(-fmax(length, 0.0f));
-            rng_t rng = stream(s, begin + slot / samples, first + slot % samples, round + 1);
             float3 light = gathered(s, &there, next.tint * (sample->share * color_weight(s, k)), &next, &rng, tally);
             put3(sample->light, view3(sample->light) + light);
         }
@@ -124,6 +124,9 @@ __kernel void gather(SCENE, uint begin, uint end, uint first, uint samples, uint
         tally[BOUNCES]++;
         go_on++;
         const surface_t again = surface_at(s, next.hit);
+        start_t unseen;
+        float3 color = next.tint * (sample->share * color_weight(s, sample->wavelength));
+        put3(sample->light, view3(sample->light) + color * reflected(s, &again, next.direction, &unseen, &rng, tally));
         enter(s, &again, &next, slot, entry, sample);
     }
     waiting[get_global_id(0)] = go_on;

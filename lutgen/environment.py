@@ -14,6 +14,8 @@ from lutgen import color, exr, hdr
 from lutgen.errors import InputError
 
 SUFFIXES = (".exr", ".hdr", ".pic")
+MOST = 1e9
+"""Radiance of a texel at most; a sun in an unclipped picture is about 1e5 times its sky."""
 ROWS = 256
 """Rows of the sharpest level, 512 columns wide."""
 LEVELS = 8
@@ -24,8 +26,8 @@ _CONVOLVED, _SOURCE_ROWS = 3, 64
 def read(path: Path) -> np.ndarray:
     """Radiance [rows, 2 rows, 3] in linear ACEScg of an equirectangular .exr or .hdr, first row on top.
 
-    Raises InputError for a file that is missing or broken, not twice as wide as high, or holds NaN, infinite or
-    negative values.
+    Raises InputError for a file that is missing or broken, not twice as wide as high, or holds NaN, infinite, negative
+    or absurdly large values.
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
@@ -40,6 +42,9 @@ def read(path: Path) -> np.ndarray:
         raise InputError(f"environment {path}: holds NaN or infinite values; mend it")
     if radiance.min() < 0:
         raise InputError(f"environment {path}: holds negative values, down to {radiance.min():g}; mend it")
+    if radiance.max() > MOST:
+        most = f"{radiance.max():g}; allowed is 0 to {MOST:g}"
+        raise InputError(f"environment {path}: holds a radiance of {most}; scale it down")
     acescg = color.from_xyz(radiance @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg")
     return np.maximum(acescg, 0.0)
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,7 +65,7 @@ def write(path: Path, parts: list[Part], chromaticities: tuple[float, ...] = ACE
 def read(path: Path) -> dict[str, Part]:
     """Parts of a file by name; InputError where it is not a whole OpenEXR file."""
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as image:
+        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as image:
             parts = {}
             for part in image.parts:
                 attributes = {
@@ -75,6 +78,25 @@ def read(path: Path) -> dict[str, Part]:
                     raise ValueError("no pixels")
                 primaries = part.header.get("chromaticities", REC709)  # what a file that names none has
                 parts[part.name()] = Part(part.name(), channels, attributes, tuple(float(v) for v in primaries))
+            if not parts:
+                raise ValueError("cut short")
             return parts
     except (RuntimeError, ValueError, IndexError) as error:
         raise InputError(f"{path}: not a whole OpenEXR file of a LUT set ({error}); bake it anew") from error
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what OpenEXR prints about a broken file, past Python, beside what it raises or leaves out."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # no standard error at all
+        yield
+        return
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

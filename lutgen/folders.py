@@ -42,6 +42,20 @@ def whole(out: str | Path, force: bool = False, mark: str = MARK) -> Iterator[Pa
             shutil.rmtree(leftover, ignore_errors=True)
 
 
+def check_file(name: str, path: str | Path, suffix: str) -> Path:
+    """The path; InputError that names the option, before any work, where such a file cannot be written there."""
+    path = Path(path)
+    if path.suffix.lower() != suffix:
+        raise InputError(f"{name} = {path}: the name of a file ending in {suffix} is needed")
+    if path.is_dir():
+        raise InputError(f"{name} = {path}: is a folder; give the name of a file ending in {suffix}")
+    if not path.parent.is_dir():
+        raise InputError(f"{name} = {path}: there is no folder {path.parent}; make it first")
+    if not os.access(path.parent, os.W_OK | os.X_OK) or (path.exists() and not os.access(path, os.W_OK)):
+        raise InputError(f"{name} = {path}: cannot be written; choose another place")
+    return path
+
+
 @contextmanager
 def whole_file(name: str, out: str | Path) -> Iterator[Path]:
     """A file to write that becomes `out` when the block ends well; else `out` is as it was.

@@ -24,11 +24,12 @@ _PLANAR, _BITS = 284, 258
 @dataclass(frozen=True)
 class Picture:
     """`values` [rows, columns, 1 or 3], first row on top; `alpha` [rows, columns] or None. `bits`: 8 or 16 of texels in
-    0 to 1, 32 of values as they are."""
+    0 to 1, 32 of values as they are. `chromaticities`: what an EXR says of its colors."""
 
     values: np.ndarray
     alpha: np.ndarray | None
     bits: int
+    chromaticities: tuple[float, ...] | None = None
 
 
 def read(path: Path, what: str) -> Picture:
@@ -37,12 +38,14 @@ def read(path: Path, what: str) -> Picture:
     `what` it is begins each message. InputError for anything else, and for NaN.
     """
     path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{what} {path}: is a folder; give a picture in it")
     if not path.is_file():
         raise InputError(f"{what} {path}: there is no such file")
     if not path.stat().st_size:
         raise InputError(f"{what} {path}: the file is empty")
     found = _exr(path, what) if path.suffix.lower() == ".exr" else _pillow(path, what)
-    if not np.all(np.isfinite(found.values)):
+    if not np.all(np.isfinite(found.values)) or not (found.alpha is None or np.all(np.isfinite(found.alpha))):
         raise InputError(f"{what} {path}: holds NaN or infinite values; mend it")
     return found
 
@@ -51,14 +54,18 @@ def _exr(path: Path, what: str) -> Picture:
     from lutgen import exr
 
     try:
-        channels = next(iter(exr.read(path).values())).channels
+        part = next(iter(exr.read(path).values()))
+        channels = part.channels
+        layers = (name.removesuffix("R") for name in channels if name == "R" or name.endswith(".R"))
+        layer = next((one for one in layers if all(one + c in channels for c in "GB")), "")
+        channels = {name.removeprefix(layer): values for name, values in channels.items() if name.startswith(layer)}
         alpha = channels.get("A") if len(channels) > 1 else None
         colors = {name: values for name, values in channels.items() if alpha is None or name != "A"}
         names = [n for n in "RGB" if n in colors] if set("RGB") <= set(colors) else sorted(colors)[-1:]
         values = np.stack([colors[n].astype("f4") for n in names], axis=-1)
         if alpha is not None and alpha.shape != values.shape[:2]:
             raise ValueError
-        return Picture(values, None if alpha is None else alpha.astype("f4"), 32)
+        return Picture(values, None if alpha is None else alpha.astype("f4"), 32, part.chromaticities)
     except ValueError as error:  # InputError too, which speaks of LUT sets
         raise InputError(f"{what} {path}: not a whole OpenEXR file, or its channels differ in size") from error
 

@@ -1,6 +1,7 @@
 """`lutgen compare`: what differs is found, what is noise is not, and its sigma is what repeated renders scatter by."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -243,8 +244,29 @@ def test_bad_input_is_one_line_that_names_it(tmp_path, capsys):
     p3 = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)
     assert "other primaries" in refused(capsys, good, write(tmp_path / "p3.exr", scene(), p3))
     assert "png" in refused(capsys, good, good, "--png", tmp_path / "no" / "x.png")
+    copy = write(tmp_path / "copy.exr", scene())
+    before = copy.read_bytes()
+    Image.new("RGB", (8, 8)).save(tmp_path / "p.png")
+    assert "is one of the pictures to compare" in refused(capsys, good, tmp_path / "p.png", "--png", tmp_path / "p.png")
+    assert "ending in .png is needed" in refused(capsys, good, copy, "--png", copy)
+    assert copy.read_bytes() == before
     with pytest.raises(InputError, match="one size"):
         pictures.mask(exact(scene()), exact(scene()[:4]))
+
+
+def test_renders_of_one_seed_are_refused_for_their_noise_is_alike():
+    a, b = (replace(rendered(scene(), 0.1, 3), seed=seed) for seed in (5, 6))
+    assert difference.compare(a, b).boxes > 0
+    with pytest.raises(InputError, match=r"both rendered with seed 5, .* another --seed"):
+        difference.compare(a, replace(b, seed=5))
+
+
+def test_over_black_no_share_is_known(tmp_path, capsys):
+    black, lit = (write(tmp_path / f"{k}.exr", k * scene(), mask=1 + 0 * scene()[..., 0]) for k in (0, 1))
+    assert main(["compare", str(black), str(lit)]) == 0
+    assert "R unknown (A: 0), G unknown" in capsys.readouterr().out
+    assert main(["compare", str(black), str(lit), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["bias"]["r"] is None
 
 
 def test_the_command_prints_figures_json_and_a_picture(tmp_path, capsys):

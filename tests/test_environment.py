@@ -179,6 +179,7 @@ def test_normalizing_makes_a_file_as_bright_as_the_studio(tmp_path):
         ("a.hdr", np.ones((8, 8, 3)), "is 8 x 8; a picture"),
         ("a.exr", np.full((4, 8, 3), np.nan), "holds NaN or infinite"),
         ("a.exr", np.full((4, 8, 3), -0.5), "negative values, down to -0.5"),
+        ("a.exr", np.full((4, 8, 3), 1e20), "holds a radiance of 1e+20; allowed is 0 to 1e+09"),
         ("a.png", None, "allowed is studio, none or a file ending in .exr, .hdr, .pic"),
         ("none.exr", None, "there is no such file"),
         ("broken.exr", b"nothing", "not a whole OpenEXR file"),

@@ -268,6 +268,46 @@ def test_every_color_of_no_skin_is_marked(capsys, tmp_path, painted):
     assert np.mean(missed[16:] > 0) < 0.01
 
 
+def test_an_albedo_in_acescg_is_read_as_it_says(capsys, tmp_path, luts, painted):
+    linear = painted[2].astype("f4")
+    acescg = color.from_xyz(linear @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg").astype("f4")
+    skins = []
+    for name, texels, primaries in (("s", linear, exr.REC709), ("a", acescg, exr.ACESCG)):
+        path = tmp_path / f"{name}.exr"
+        exr.write(path, [exr.Part("a", exr.rgb(texels), {})], primaries)
+        skins.append(list(made(capsys, path, "--out", tmp_path / name)["skin"].values()))
+    assert skins[0] == pytest.approx(skins[1], rel=0.01)
+    p3 = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)
+    exr.write(tmp_path / "p3.exr", [exr.Part("a", exr.rgb(linear), {})], p3)
+    status, _, err = run(capsys, tmp_path / "p3.exr", "--out", tmp_path / "p3")
+    assert status == 2
+    assert "has other primaries than Rec. 709 and ACEScg" in err
+
+
+def test_colors_of_no_skin_are_refused_and_many_of_them_are_said(capsys, tmp_path, painted):
+    blue = painted[2][..., ::-1].copy()
+    status, out, err = run(
+        capsys, save(tmp_path / "b.png", np.full((8, 8, 3), [0.02, 0.05, 0.9])), "--out", tmp_path / "b"
+    )
+    assert (status, out) == (2, "")
+    assert "its colors are those of no skin (ΔE00 " in err
+    assert not (tmp_path / "b").exists()
+    some = painted[2].copy()
+    some[: len(some) // 3] = blue[: len(some) // 3]
+    said = made(capsys, save(tmp_path / "c.png", some), "--out", tmp_path / "c", "--balance", "none")
+    assert any("farther than 5 from any skin" in line for line in said["warnings"])
+    assert not any(
+        "farther" in w for w in made(capsys, save(tmp_path / "d.png", painted[2]), "--out", tmp_path / "d")["warnings"]
+    )
+
+
+def test_where_to_see_it_names_the_set_and_can_be_pasted(capsys, tmp_path, luts, painted):
+    folder = lutgen.manifest.save(luts, tmp_path / "my set")
+    out = tmp_path / "my maps"
+    assert cli.main(["maps", str(save(tmp_path / "a.png", painted[2])), "--out", str(out), "--luts", str(folder)]) == 0
+    assert f"lutgen view '{folder}' --maps '{out}' --set" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("shape", [(1, 1), (3, 200), (70, 9)])
 def test_any_size_and_an_expanded_set(capsys, tmp_path, luts, shape):
     folder = lutgen.manifest.save(luts.expand(oxygenation=0.95), tmp_path / "luts")

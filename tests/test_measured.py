@@ -111,7 +111,7 @@ def test_bad_input_is_named(given, message):
 
 def test_pictures_and_folders_are_no_tables(tmp_path):
     (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n\xff\xfe\xfd")
-    for path, message in ((tmp_path / "picture.png", "not a text file"), (tmp_path, "cannot be read")):
+    for path, message in ((tmp_path / "picture.png", "not text in UTF-8"), (tmp_path, "cannot be read")):
         with pytest.raises(lutgen.InputError, match=message):
             measured.read(path)
 

@@ -85,6 +85,7 @@ def test_a_profile_counts_from_the_own_disc_of_a_pixel():
         ("melanin=0.1:0.05", None, {}, "melanin = 0.1:0.05: low is above high; swap them"),
         ("melanin=0.1:2", None, {}, "melanin = 2: allowed is 0.001 to 0.5"),
         ("melanin=dark", None, {}, "tones: melanin = 'dark': VALUE or LOW:HIGH is needed"),
+        ("melanin=0.1:", None, {}, "tones: melanin = '0.1:': VALUE or LOW:HIGH is needed"),
         ("melanin=nan", None, {}, "melanin = nan: allowed is 0.001 to 0.5"),
         ("bilirubin=1", None, {}, "tones = 'bilirubin': allowed is melanin, eumelanin, hemoglobin, oxygenation"),
         ("light,dark", "melanin", {}, "vary = melanin: the tones hold hemoglobin from 0.0088 to 0.018; add hemoglobin"),

@@ -93,6 +93,36 @@ def test_alpha_of_exr_is_read(tmp_path):
     assert np.array_equal(found.alpha, alpha)
 
 
+def test_a_layer_of_exr_is_a_color(tmp_path):
+    texels = np.random.default_rng(0).random((2, 3, 3)).astype("f4")
+    channels = {f"albedo.{name}": texels[..., i].copy() for i, name in enumerate("RGB")} | {"Z": texels[..., 0].copy()}
+    exr.write(tmp_path / "a.exr", [exr.Part("a", channels, {})], exr.REC709)
+    found = pictures.read(tmp_path / "a.exr", "map")
+    assert np.array_equal(found.values, texels)
+    assert found.chromaticities == pytest.approx(exr.REC709)
+
+
+def test_a_cut_exr_is_one_line_and_openexr_says_nothing_beside_it(tmp_path, capfd):
+    exr.write(
+        tmp_path / "a.exr", [exr.Part("a", exr.rgb(np.random.default_rng(0).random((64, 64, 3)).astype("f4")), {})]
+    )
+    whole = (tmp_path / "a.exr").read_bytes()
+    for size in (100, 500, len(whole) // 2, len(whole) - 10):
+        (tmp_path / "b.exr").write_bytes(whole[:size])
+        with pytest.raises(lutgen.InputError, match=r"map .*b.exr: not a whole OpenEXR file"):
+            pictures.read(tmp_path / "b.exr", "map")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_alpha_that_is_no_number_and_a_folder_are_one_line(tmp_path):
+    channels = exr.rgb(np.full((2, 3, 3), 0.5, "f4")) | {"A": np.full((2, 3), np.nan, "f4")}
+    exr.write(tmp_path / "a.exr", [exr.Part("a", channels, {})])
+    with pytest.raises(lutgen.InputError, match="holds NaN"):
+        pictures.read(tmp_path / "a.exr", "map")
+    with pytest.raises(lutgen.InputError, match="is a folder"):
+        pictures.read(tmp_path, "map")
+
+
 def test_nothing_is_one_line(tmp_path):
     (tmp_path / "a.png").write_bytes(b"")
     with pytest.raises(lutgen.InputError, match="map .*a.png: the file is empty"):

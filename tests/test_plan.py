@@ -15,7 +15,7 @@ from lutgen import baking, cli, config, expansion, planning, profiles, quadratur
 from lutgen.axes import default_grid
 from lutgen.config import Recipe
 from lutgen.errors import InputError
-from lutgen.planning import costs, judging, pilot, prediction, verifying
+from lutgen.planning import costs, explaining, judging, pilot, prediction, verifying
 from lutgen.planning.needs import scene
 from lutgen.solvers import path_table, totals
 
@@ -211,6 +211,26 @@ def test_where_the_tolerance_costs_too_much_it_is_said_what_can_be_had(limit, fe
     plan = planning.plan(scene("all", "melanin", **had, **limit))
     assert plan.cost[0] <= limit.get("seconds", np.inf)
     assert plan.cost[1] <= limit.get("bytes", np.inf)
+
+
+def test_no_seconds_at_all_is_a_limit_too():
+    with pytest.raises(InputError, match=r"^seconds = 0: 0.5 ΔE00 with EE 0.025 takes .* s at least;"):
+        planning.plan(scene("light", seconds=0.0))
+
+
+def test_a_viewer_that_cannot_hold_and_a_scale_not_measured_are_said(capsys):
+    status, text, _ = run(capsys, "plan", "--tones", "light", "--tolerance", 0.02)
+    assert status == 0
+    assert "viewer: tier reference, 64 taps; EE 0.0037 under a disc of 6 pixels: no tier is within 0.002" in text
+    _, text, _ = run(capsys, "plan", "--tones", "light", "--mm-per-pixel", 0.001)
+    assert "at 0.05 mm per pixel, the finest that was measured" in text
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "shown"), [(0.02523, 0.025, "0.0252"), (0.5004, 0.5, "0.5004"), (0.6, 0.5, "0.6")]
+)
+def test_what_is_too_much_never_reads_as_the_limit(value, limit, shown):
+    assert explaining._apart(value, limit, 2) == shown
 
 
 def test_where_nothing_can_be_had_for_so_little_it_is_said(capsys, tmp_path):

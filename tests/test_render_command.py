@@ -132,10 +132,11 @@ def test_a_killed_render_goes_on_and_an_interrupted_one_saves(tmp_path, head):
         (["--size", "8x8"], "size = 8x8: allowed is 16 to 4096"),
         (["--walk", "random"], "walk = 'random': allowed is flat"),
         (["--seed", "-1"], "seed = -1"),
-        (["--out", "a.png"], "out = a.png: the name of an .exr is needed"),
+        (["--out", "a.png"], "out = a.png: the name of a file ending in .exr is needed"),
         (["--out", "none/a.exr"], "there is no folder none; make it first"),
         (["--out", "folder.exr"], "is a folder"),
-        (["--png", "a.jpg"], "png = a.jpg: the name of a .png is needed"),
+        (["--png", "folder.png"], "png = folder.png: is a folder"),
+        (["--png", "a.jpg"], "png = a.jpg: the name of a file ending in .png is needed"),
         (["--set", "melanin=0.7"], "melanin = 0.7: allowed is"),
         (["--device", "none such"], "no device matches"),
         (["--mesh", "none.glb"], "there is no such file"),
@@ -145,11 +146,12 @@ def test_a_killed_render_goes_on_and_an_interrupted_one_saves(tmp_path, head):
 def test_bad_input_is_one_line(arguments, message, tmp_path, head, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.exr").mkdir()
+    (tmp_path / "folder.png").mkdir()
     assert main(["render", *SMALL, "--spp", "5", "--out", "a.exr", "--mesh", head, *arguments]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["folder.exr"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["folder.exr", "folder.png"]
 
 
 def test_a_set_that_does_not_cover_the_skin_is_one_line(tmp_path, head, capsys):
@@ -175,6 +177,15 @@ def test_without_opencl_the_line_says_what_to_install(tmp_path, head, capsys, mo
     error = capsys.readouterr().err
     assert "no OpenCL device" in error
     assert error.count("\n") == 1
+
+
+def test_triangles_that_run_both_ways_are_said(tmp_path, capsys):
+    ball = trimesh.creation.icosphere(3, 110)
+    ball.faces[::5] = ball.faces[::5, ::-1]
+    ball.export(tmp_path / "mixed.glb")
+    command = ["render", *SMALL, "--mesh", str(tmp_path / "mixed.glb"), "--spp", "5", "--out", str(tmp_path / "a.exr")]
+    assert main(command) == 0
+    assert "% of what the camera sees are back faces: triangles run both ways round" in capsys.readouterr().out
 
 
 def test_what_is_odd_about_a_head_is_said(tmp_path, capsys):

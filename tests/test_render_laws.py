@@ -201,6 +201,35 @@ def test_sunlit_skin_lights_skin_without_surroundings(walk, specular):
     assert np.all(np.hypot(one, two) < 0.03 * dark)
 
 
+def corner(side: float = 400.0) -> Mesh:
+    """A floor and a wall that meet at a right angle in the x axis, open toward +y and +z."""
+    p = np.array([[-1, 0, 0], [1, 0, 0], [-1, 0, 1], [1, 0, 1], [-1, 0, 0], [1, 0, 0], [-1, 1, 0], [1, 1, 0]], "f4")
+    normals = np.repeat(np.array([[0, 1, 0], [0, 0, 1]], "f4"), 4, axis=0)
+    return Mesh(p * side, normals, None, np.array([[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6]], "i4"))
+
+
+@pytest.mark.parametrize(("walk", "samples"), [("flat", 800), ("flat-full", 1600)])
+def test_skin_mirrors_skin_that_mirrors_the_sky(walk, samples):
+    """At 45 degrees into a corner of smooth dark skin under an even sky the floor mirrors what the wall mirrors of the
+    sky, F^2, and what it scatters, which looks like the floor; and scatters what the wall mirrors: the wall is half of
+    its sky, seen from the wall's normal at cosines z with density 4 / pi sqrt(1 - z^2)."""
+    z = (np.arange(4096) + 0.5) / 4096
+    f, of_wall = (
+        lighting.fresnel(np.array([np.sqrt(0.5)]))[0],
+        np.mean(lighting.fresnel(z) * np.sqrt(1 - z**2)) * 4 / np.pi,
+    )
+    look = replace(FRONT, entry=0, environment=1, light=0, elevation=45, target_mm=(0, 0, 0), roughness=0.15,
+                   field_of_view=5.0, melanin=0.5, hemoglobin=0.1)  # fmt: skip
+    found = []
+    for specular in (0.0, 1.0):
+        on = opened(corner(), replace(look, specular=specular), (16, 16), around=EVEN)
+        found.append(mean(sampled(on, walks.WALKS[walk](on, 0), samples)[0]))
+    (plain, one), (shiny, two) = found
+    seen, expected = shiny - plain, f * (f + plain) + plain * of_wall
+    assert np.all(np.abs(seen - expected) < SIGMAS * np.hypot(one, two) + 0.06 * expected)  # the lobes have a width
+    assert np.all(np.hypot(one, two) < 0.1 * expected)
+
+
 @pytest.mark.parametrize("azimuth", [0.0, 70.0])
 @pytest.mark.parametrize("roughness", [0.2, 0.6])
 def test_an_even_sky_is_reflected_as_the_viewer_has_it(azimuth, roughness):

@@ -79,6 +79,20 @@ def test_noise_falls_with_samples_and_is_unknown_of_one(on, walk):
     assert made.samples < 10_000
 
 
+def test_a_noise_that_is_met_already_asks_for_nothing(on, walk):
+    made, _, noise = progressive.render(
+        on, walk, picture.empty(on.size, walk.group, {}), progressive.Goal(noise=2.5), lambda made, noise: None
+    )
+    again, tally, same = progressive.render(on, walk, made, progressive.Goal(noise=2.5), lambda made, noise: None)
+    assert (again.samples, tally.rays, same) == (made.samples, 0, noise)
+
+
+def test_noise_of_a_head_smaller_than_its_pixels_is_known(on, walk):
+    made, _ = sampled(on, walk, 50)
+    part = replace(made, sums=made.sums * np.array([0.3] * 4 + [0.09] * 6))
+    assert picture.noise_delta_e(part) > 0.1
+
+
 def test_it_stops_by_time_and_when_told_and_saves_what_it_has(on, walk):
     saved = []
     start = picture.empty(on.size, walk.group, {})
@@ -131,7 +145,7 @@ def test_what_is_no_render_is_one_line(tmp_path):
     exr.write(tmp_path / "a.exr", [exr.Part("x", exr.rgb(np.zeros((4, 4, 3), "f4")), {})])
     (tmp_path / "b.exr").write_bytes(b"nothing")
     for name in ("a.exr", "b.exr"):
-        with pytest.raises(lutgen.InputError, match=r"not a picture of `lutgen render`"):
+        with pytest.raises(lutgen.InputError, match=r"not a whole picture of `lutgen render`; give another name"):
             picture.read(tmp_path / name)
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from argparse import Namespace
 from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lutgen import folders
 from lutgen.commands import Outcome
+from lutgen.errors import InputError
 
 if TYPE_CHECKING:
     from lutgen.render.difference import Difference
@@ -17,6 +20,10 @@ def compare(options: Namespace) -> Outcome:
     """`lutgen compare`: how far B is from A, without their noise."""
     from lutgen.render import beside, difference, pictures
 
+    if options.png is not None:
+        folders.check_file("png", options.png, ".png")
+        if any(Path(options.png).resolve() == Path(one).resolve() for one in (options.a, options.b)):
+            raise InputError(f"png = {options.png}: is one of the pictures to compare; give another name")
     a, b = pictures.read(options.a), pictures.read(options.b)
     found = difference.compare(a, b)
     if options.png is not None:
@@ -28,7 +35,7 @@ def compare(options: Namespace) -> Outcome:
         "delta_e00": {name: asdict(getattr(found, name)) for name in names}
         | {"max": found.most, "noise_alone": dict(zip(names, found.noise_alone, strict=True))},
         "bias": {"lightness": asdict(found.lightness)}
-        | {name: asdict(one) for name, one in zip("rgb", found.channels, strict=True)},
+        | {name: asdict(one) if isfinite(one.value) else None for name, one in zip("rgb", found.channels, strict=True)},
         "noise_over_sigma": found.noise_over_sigma, "notes": list(found.notes),
     }  # fmt: skip
     return result, _text(found), 0
@@ -39,7 +46,7 @@ def _text(found: Difference) -> str:
     figures = {"mean": found.mean, "median": found.median, "p95": found.p95}
     shown = ", ".join(f"{name} {one.value:.3f} ± {one.sigma:.3f}" for name, one in figures.items())
     shares = ", ".join(
-        f"{name} {100 * one.value:+.2f} ± {100 * one.sigma:.2f} %"
+        f"{name} {100 * one.value:+.2f} ± {100 * one.sigma:.2f} %" if isfinite(one.value) else f"{name} unknown (A: 0)"
         for name, one in zip("RGB", found.channels, strict=True)
     )
     lines = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from argparse import Namespace
 from importlib.metadata import version
@@ -19,6 +20,10 @@ from lutgen.progress import Progress
 from lutgen.tissue import PRESETS
 
 GAINS, STOPS = (0.01, 100.0), (-8.0, 8.0)
+NO_SKIN = 10.0
+"""Median ΔE00 from which on an albedo is refused, as `lutgen fit` refuses a color."""
+_MANY = 0.2
+"""Share of texels out of reach that is said."""
 
 
 def maps_of(options: Namespace) -> Outcome:
@@ -51,13 +56,14 @@ def maps_of(options: Namespace) -> Outcome:
         progress("invert", None)
         found = inversion.invert(luts, given.linear, fit.eumelanin, fit.gain, given.painted)
         _stop("invert")
+        warnings = [one for one in (warning, no_skin(found, source)) if one is not None]
         recolored = None
         if target is not None:
             progress("recolor", None)
             recolored = retarget.recolored(luts, found, given.linear, target)
             _stop("recolor")
         progress("write", None)
-        facts = _facts(luts, given, found, options, target, [] if warning is None else [warning])
+        facts = _facts(luts, given, found, options, target, warnings)
         with folders.whole(options.out, options.force, maps.MADE) as folder:
             made = mapset.layers(luts, found, options.absolute)
             mapset.write(folder, made, options.format, recolored, given.alpha, facts)
@@ -67,6 +73,19 @@ def maps_of(options: Namespace) -> Outcome:
     per_pixel = 1e6 * seconds["invert"] / found.painted.size
     result = {"out": str(out), **facts, "seconds": seconds, "invert_us_per_pixel": round(per_pixel, 3)}
     return result, _text(result, options), 0
+
+
+def no_skin(found: inversion.Inversion, source: Path) -> str | None:
+    """A line about colors that few skins have, or None; InputError where half of them are those of none."""
+    left, check = mapset.statistics(found), "are its channels in order, and is it an albedo of skin?"
+    if left["delta_e00_median"] >= NO_SKIN:
+        raise InputError(
+            f"albedo {source}: its colors are those of no skin (ΔE00 {left['delta_e00_median']:.1f} from the nearest "
+            f"at the median; allowed is below {NO_SKIN:g}); {check}"
+        )
+    if left["out_of_reach_share"] < _MANY:
+        return None
+    return f"{left['out_of_reach_share']:.0%} of the texels are farther than {mapset.REACH:g} from any skin: {check}"
 
 
 def light(wanted: str, exposure: str | None) -> tuple[np.ndarray, str]:
@@ -161,5 +180,6 @@ def _text(result: dict, options: Namespace) -> str:
         )
     lines.append(", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
                  + f"; inverted in {result['invert_us_per_pixel']:.2f} µs a pixel")  # fmt: skip
-    lines.append(f"see it: lutgen view --maps {result['out']} {sliders}")
+    luts = f"{shlex.quote(options.luts)} " if options.luts else ""
+    lines.append(f"see it: lutgen view {luts}--maps {shlex.quote(result['out'])} {sliders}")
     return "\n".join(lines + [f"warning: {one}" for one in result["warnings"]])

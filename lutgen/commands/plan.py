@@ -65,15 +65,14 @@ def _parts(error: dict[str, float]) -> str:
 
 
 def _lines(found: Plan) -> list[str]:
-    needs, recipe, viewer = found.needs, found.recipe, found.viewer
+    needs, recipe = found.needs, found.recipe
     lines = [
         f"trace: {recipe.wavelengths} wavelengths × {recipe.photons:,} photons, {recipe.totals} totals",
         f"color table: {_axes(recipe.color)}",
         f"profile table: {_axes(recipe.profile)}; {recipe.rings} rings"
         if found.profile
         else "profile table: none needed (the recipe holds the one node that a bake takes): let the viewer not scatter",
-        f"viewer: tier {viewer.tier}"
-        + (f", {viewer.taps} taps; EE {viewer.ee_difference:.2g} under a disc of 6 pixels" if viewer.taps else ""),
+        _viewer(found),
         f"predicted color: ΔE00 {found.color_error['total']:.3g} of {needs.tolerance:g} ({_parts(found.color_error)})",
         f"predicted profile: EE {found.profile_error['total']:.2g}, at most {found.profile_error['at most']:.2g} of "
         f"{needs.ee_tolerance:.2g} from {needs.from_mm:.2g} mm on ({_parts(found.profile_error)})",
@@ -85,6 +84,19 @@ def _lines(found: Plan) -> list[str]:
         low, high = needs.oxygenation
         lines.insert(1, f"oxygenation: {low:g} to {high:g}, expanded at run time from the stored paths")
     return lines
+
+
+def _viewer(found: Plan) -> str:
+    """The viewer's line."""
+    needs, viewer = found.needs, found.viewer
+    line = f"viewer: tier {viewer.tier}"
+    if viewer.taps:
+        line += f", {viewer.taps} taps; EE {viewer.ee_difference:.2g} under a disc of 6 pixels"
+        if needs.mm_per_pixel < viewer.at_mm_per_pixel / 2:
+            line += f" at {viewer.at_mm_per_pixel:g} mm per pixel, the finest that was measured"
+        if not viewer.holds:
+            line += f": no tier is within {needs.ee_tolerance:.2g}"
+    return line
 
 
 def _verified(found: Plan, progress: Progress, device: str | None) -> dict:

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import subject
+from lutgen import folders, subject
 from lutgen.commands import Outcome
 from lutgen.commands.pictures import look_of, shown_of
-from lutgen.errors import InputError, cannot_write, one_of, whole
+from lutgen.errors import InputError, one_of, whole
 from lutgen.maps import Maps
 from lutgen.paths import SEEDS
 from lutgen.progress import Progress
@@ -26,6 +26,8 @@ from lutgen.scene import Look
 
 SIZE = "512x512"
 INTERRUPTED = 130
+_ODD = 0.01
+"""Share of back faces that is said."""
 _NOT_SEEN = ("tier", "split", "transmission", "exposure")
 """Values of a look that a render does not depend on."""
 
@@ -39,9 +41,9 @@ def render(options: Namespace) -> Outcome:
     goal = progressive.goal_of(options.spp, options.time, options.noise)
     one_of("walk", options.walk, tuple(walks.WALKS))
     seed, size = whole("seed", options.seed, *SEEDS), subject.size_of(options.size or SIZE)
-    look, out = look_of(options), Path(options.out)
-    picture.check_target(out)
-    _check_png(options.png)
+    look, out = look_of(options), folders.check_file("out", options.out, ".exr")
+    if options.png is not None:
+        folders.check_file("png", options.png, ".png")
     device = ocl.choose(options.device)
     luts, shape, given, around, notes = shown_of(options, look)
     shape, more = soundness.mended(shape)
@@ -109,6 +111,11 @@ def _report(options, made, tally, noise: float, walk, seconds: dict, notes: tupl
         lines.append(
             f"of {photons['entered']} walks {photons['lost']} were lost at folds of the mesh, {photons['unfinished']} "
             "given up for their length"
+        )
+    if counts.get("BACKS", 0) > _ODD * counts.get("HITS", 0):
+        lines.append(
+            f"{100 * counts['BACKS'] / counts['HITS']:.2g} % of what the camera sees are back faces: triangles run "
+            "both ways round, or the mesh is open; unify its normals in your editor"
         )
     if counts.get("BROKEN"):
         lines.append(f"{counts['BROKEN']} samples were not finite and were left out")
@@ -197,26 +204,10 @@ def _short(value: object) -> str:
     return text if len(text) <= 24 else text[:21] + "..."
 
 
-def _check_png(name: str | None) -> None:
-    if name is None:
-        return
-    path = Path(name)
-    if path.suffix.lower() != ".png":
-        raise InputError(f"png = {name}: the name of a .png is needed")
-    if not path.parent.is_dir():
-        raise InputError(f"png = {name}: there is no folder {path.parent}; make it first")
-
-
 def _write_png(made, look: Look, name: str) -> None:
     from PIL import Image
 
     from lutgen import tone
 
-    partial = Path(name).with_name(f".{Path(name).name}.partial")
-    try:
+    with folders.whole_file("png", name) as partial:
         Image.fromarray(tone.picture(made.rgb, made.mask, look.exposure)).save(partial, format="PNG")
-        partial.replace(name)
-    except OSError as error:
-        raise cannot_write("png", name, error) from error
-    finally:
-        partial.unlink(missing_ok=True)

@@ -96,6 +96,10 @@ def fit(options: Namespace) -> Outcome:
         wanted = tuple(name for name in default if name not in given)
     for name in wanted:
         one_of("parameters", name, tuple(fitting.PARAMETERS))
+        if wanted.count(name) > 1:
+            raise InputError(f"parameters = {options.parameters}: {name} is there twice; name each once")
+    if not wanted and options.parameters is None:
+        raise InputError(f"--{', --'.join(given)}: all is fixed, nothing is left to fit; leave one of them out")
     both = [name for name in wanted if name in given]
     if both:
         raise InputError(f"{both[0]}: both fitted and fixed; drop --{both[0]}, or take it out of --parameters")

@@ -49,6 +49,8 @@ def read(given) -> Measured:
         return given
     if isinstance(given, (str, Path)):
         text = str(given)
+        if not text.strip():
+            raise InputError(f"measured = {text!r}: a CSV's path or a color is needed: {GRAMMAR}")
         code, named = _HEX.fullmatch(text.strip()), _SPACE.fullmatch(text)
         if code and (text.strip().startswith("#") or not Path(text).exists()):
             return of_color("srgb", np.array(list(bytes.fromhex(code[1]))) / 255)
@@ -162,7 +164,9 @@ def _from_csv(path: Path) -> Measured:
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file; a CSV with columns {', '.join(COLUMNS)} is needed") from None
+        raise InputError(
+            f"{path}: not text in UTF-8; save it as a CSV in UTF-8 with columns {', '.join(COLUMNS)}"
+        ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(

@@ -1,7 +1,8 @@
 """An albedo as it was painted or photographed: read with its alpha, decoded to linear sRGB, and doubted.
 
-Pictures of 8 and 16 bits are taken for sRGB, EXR for linear Rec. 709. Whether a file means what it seems to is asked of
-skin itself: read the wrong way, its colors lie farther from those of skin, or are those of a tone that no one has.
+Pictures of 8 and 16 bits are taken for sRGB, EXR for linear Rec. 709 or ACEScg, as it says. Whether a file means what
+it seems to is asked of skin itself: read the wrong way, its colors lie farther from those of skin, or are those of a
+tone that no one has.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def read(path: Path | str, encoding: str | None = None) -> Albedo:
         raise InputError(gray)
     if found.values.min() < 0:
         raise InputError(f"albedo {path}: holds negative values, down to {found.values.min():g}; mend it")
-    linear = color.decode_srgb(found.values) if encoding == "srgb" else np.ascontiguousarray(found.values, "f4")
+    linear = color.decode_srgb(found.values) if encoding == "srgb" else _linear(found, path)
     clear = None if found.alpha is None else found.alpha > 0
     if clear is not None and not clear.any():
         raise InputError(f"albedo {path}: is clear throughout (alpha 0); there is no skin to invert")
@@ -68,6 +69,17 @@ def read(path: Path | str, encoding: str | None = None) -> Albedo:
     if np.mean(some.max(axis=1) - some.min(axis=1) > _COLORLESS * some.max(axis=1)) < 0.01:
         raise InputError(gray)
     return Albedo(linear, found.alpha, painted, encoding, usual, found.bits)
+
+
+def _linear(found: pictures.Picture, path: Path | str) -> np.ndarray:
+    """Linear sRGB [R, C, 3] of linear texels; what lies outside sRGB is brought to its edge."""
+    from lutgen import exr
+
+    if found.chromaticities is None or np.allclose(found.chromaticities, exr.REC709, atol=1e-3):
+        return np.ascontiguousarray(found.values, "f4")
+    if not np.allclose(found.chromaticities, exr.ACESCG, atol=1e-3):
+        raise InputError(f"albedo {path}: has other primaries than Rec. 709 and ACEScg; convert it to linear Rec. 709")
+    return np.maximum(color.from_acescg(found.values, "srgb"), 0).astype("f4")
 
 
 def doubt(luts: LutSet, albedo: Albedo) -> str | None:

@@ -86,12 +86,12 @@ def statistics(found: Inversion) -> dict:
     left = found.residual[found.painted]
     skin = found.skin
     beyond = (found.melanin > maps.RATIO_RANGE * skin[0]) | (found.hemoglobin > maps.RATIO_RANGE * skin[2])
-    missed = out_of_reach(found)[found.painted]
     middle, p95 = np.quantile(left, (0.5, 0.95))
     return {
         "texels": int(left.size), "delta_e00_mean": float(left.mean(dtype=float)), "delta_e00_median": float(middle),
         "delta_e00_p95": float(p95), "delta_e00_max": float(left.max()),
-        "out_of_reach_share": float(np.mean(missed == BEYOND)), "at_edge_share": float(np.mean(missed == AT_EDGE)),
+        "out_of_reach_share": float(np.mean(left > REACH)),
+        "at_edge_share": float(np.mean(found.at_edge[found.painted])),
         "beyond_png_ratio_share": float(np.mean(beyond[found.painted])),
     }  # fmt: skip
 

@@ -22,9 +22,9 @@ class Tier:
     taps: int
     ee_difference: tuple[tuple[float, float], ...]
 
-    def error(self, mm_per_pixel: float) -> float:
-        """EE difference at the nearest scale that was measured."""
-        return min(self.ee_difference, key=lambda pair: abs(np.log(pair[0] / mm_per_pixel)))[1]
+    def error(self, mm_per_pixel: float) -> tuple[float, float]:
+        """The nearest scale that was measured, and the EE difference there."""
+        return min(self.ee_difference, key=lambda pair: abs(np.log(pair[0] / mm_per_pixel)))
 
     def holds(self, mm_per_pixel: float, tolerance: float) -> bool:
         """Whether the tier was within a tolerance at this scale or at a finer one, which asks more of it."""

@@ -17,11 +17,14 @@ from lutgen.planning.needs import EE_TOLERANCE, TOLERANCE, Needs
 
 @dataclass(frozen=True)
 class Viewer:
-    """What the viewer needs: taps at most, the tier that has them, and its EE difference at the scene's scale."""
+    """What the viewer needs: taps at most, the tier that has them, its EE difference, at which measured scale, and
+    whether that is within the tolerance (else it is the best tier)."""
 
     taps: int
     tier: str
     ee_difference: float
+    at_mm_per_pixel: float
+    holds: bool
 
 
 @dataclass(frozen=True)
@@ -57,12 +60,13 @@ def viewer(judged: Judge) -> Viewer:
     """The cheapest tier within the profile's tolerance at the scene's scale, with the taps that its footprint takes."""
     needs = judged.needs
     if not judged.with_profile:
-        return Viewer(0, "off", judged.profiles.unscattered())
+        return Viewer(0, "off", judged.profiles.unscattered(), needs.mm_per_pixel, True)
     tiers = costs.tiers()
     tier = next((tier for tier in tiers if tier.holds(needs.mm_per_pixel, needs.ee_tolerance)), tiers[-1])
     footprint = judged.profiles.reach_mm() / needs.mm_per_pixel  # as gather.frag.glsl takes its taps
     taps = int(np.clip(np.ceil(4 * footprint), 8, tier.taps))
-    return Viewer(taps, tier.name, tier.error(needs.mm_per_pixel))
+    scale, error = tier.error(needs.mm_per_pixel)
+    return Viewer(taps, tier.name, error, scale, tier.holds(needs.mm_per_pixel, needs.ee_tolerance))
 
 
 def color_error(judged: Judge, recipe: Recipe) -> dict[str, float]:
@@ -128,11 +132,17 @@ def why(judged: Judge, recipe: Recipe) -> tuple[str, ...]:
 def _would(judged: Judge, recipe: Recipe) -> str:
     """What a rung down would err by: of color and profile that which is too much, else both."""
     needs, found = judged.needs, judged.color(recipe)
-    parts = [(f"ΔE00 {found:.3g} of {needs.tolerance:g}", found / needs.tolerance)]
+    parts = [(f"ΔE00 {_apart(found, needs.tolerance, 3)} of {needs.tolerance:g}", found / needs.tolerance)]
     if judged.with_profile:
         likely = judged.profile(recipe).likely
-        parts.append((f"EE {likely:.2g} of {needs.ee_tolerance:.2g}", likely / needs.ee_tolerance))
+        shown = _apart(likely, needs.ee_tolerance, 2)
+        parts.append((f"EE {shown} of {needs.ee_tolerance:.2g}", likely / needs.ee_tolerance))
     return " and ".join([text for text, share in parts if share > 1] or [text for text, _ in parts])
+
+
+def _apart(value: float, limit: float, digits: int) -> str:
+    """A value with so many digits, or as many more as tell it from the limit."""
+    return next((text for more in range(4) if float(text := f"{value:.{digits + more}g}") != limit), f"{value:g}")
 
 
 def nodes(grid: Grid) -> str:
@@ -146,11 +156,11 @@ def unaffordable(judged: Judge, found: list[tuple[float, int]]) -> InputError:
     spent = min(seconds for seconds, _ in found), min(size for _, size in found)
     over = [
         f"{name} = {most:g}: {needs.tolerance:g} ΔE00 with EE {needs.ee_tolerance:.2g} takes {least}"
-        for name, most, least, too_much in (
-            ("seconds", needs.seconds or 0, f"{spent[0]:.2f} s at least", spent[0] > (needs.seconds or np.inf)),
-            ("bytes", needs.bytes or 0, f"{spent[1]} bytes at least", spent[1] > (needs.bytes or np.inf)),
+        for name, most, need, least in (
+            ("seconds", needs.seconds, spent[0], f"{spent[0]:.2f} s at least"),
+            ("bytes", needs.bytes, spent[1], f"{spent[1]} bytes at least"),
         )
-        if too_much
+        if most is not None and need > most
     ] or [f"seconds = {needs.seconds:g} with bytes = {needs.bytes}: no recipe keeps both"]
     scale = _had(judged)
     if scale is None:

@@ -165,9 +165,9 @@ def _parts(parts: list[str], whole_of: Iterable[str]) -> tuple[dict[str, Range],
 
 
 def _numbers(name: str, text: str) -> tuple[float, float]:
-    low, _, high = text.partition(":")
+    low, colon, high = text.partition(":")
     try:
-        return float(low), float(high or low)
+        return float(low), float(high if colon else low)
     except ValueError as error:
         raise InputError(f"tones: {name} = {shown(text)}: VALUE or LOW:HIGH is needed") from error
 

@@ -49,7 +49,8 @@ class Difference:
 
     `delta_e00` [rows / 4, columns / 4]: a box's difference, NaN where less than half of it is skin in both.
     `noise_alone`: mean, median and p95 that pictures without any difference but this noise would show.
-    `lightness`: mean of B - A in L*; `channels`: mean of B over mean of A, less 1, for R, G and B of ACEScg.
+    `lightness`: mean of B - A in L*; `channels`: mean of B over mean of A, less 1, for R, G and B of ACEScg, NaN
+    where A is black.
     `noise_over_sigma`: scatter within boxes over what the files' sigma says (1: honest; more also where fine structure
     differs); None without noise.
     """
@@ -68,7 +69,13 @@ class Difference:
 
 
 def compare(a: Picture, b: Picture) -> Difference:
-    """B against A, pictures of one size; InputError where sizes differ or too little shows skin in both."""
+    """B against A, pictures of one size; InputError where sizes differ, too little shows skin in both, or renders share
+    their random numbers."""
+    if a.seed is not None and a.seed == b.seed:
+        raise InputError(
+            f"{a.name}, {b.name}: both rendered with seed {a.seed}, so their noise is alike and cannot be taken off; "
+            "render one of them with another --seed"
+        )
     seen, notes = mask(a, b)
     n = _boxed(seen[..., None].astype(float))[..., 0]
     full = n >= _LEAST
@@ -97,10 +104,12 @@ def compare(a: Picture, b: Picture) -> Difference:
     light = np.sqrt(np.einsum("na,nb,nab->", J[:, 0], J[:, 0], S)) / len(found)
     total = [one.acescg[seen].sum(axis=0) for one in (a, b)]
     error = np.sqrt(np.diag(covariance[seen].sum(axis=0)))
-    gain, gain_sigma = (v / np.maximum(total[0], 1e-12) for v in (total[1], error))
     mean, median, p95 = (Figure(float(v), s) for v, s in zip(values, sigmas, strict=True))
     lightness = Figure(float((labs[1] - labs[0])[:, 0].mean()), float(light))
-    channels = tuple(Figure(float(g) - 1, float(s)) for g, s in zip(gain, gain_sigma, strict=True))
+    channels = tuple(
+        Figure(float(two / one) - 1, float(s / one)) if one > 0 else Figure(np.nan, np.nan)
+        for one, two, s in zip(*total, error, strict=True)
+    )
     return Difference(
         image,
         len(found),

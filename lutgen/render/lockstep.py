@@ -29,7 +29,7 @@ BLOCK = {"cpu": queues.BLOCK, "gpu": queues.BLOCK // 16}
 """Pixels that one work-item walks in turn; random streams are keyed by their number."""
 STEPS_PER_PHOTON = 100_000
 """Steps that a block's photons may take on average: far more than any skin's absorption leaves them."""
-_GROUPS, _TURNS = 2**13, 16  # of pixels and of walks from skin to skin, in a stream's number
+_GROUPS, _TURNS = 2**17, 16  # of pixels and of walks from skin to skin, in a stream's number
 _EVENTS_PER_LAUNCH = 4e7  # half a second of the slower walk on two cores
 
 
@@ -75,8 +75,9 @@ def jobs(medium: Medium, part: queues.Part, seed: int, size: int) -> np.ndarray:
     for field, values in (("mu_s", medium.mu_s_per_mm), ("g", medium.g), ("nu", medium.nu_per_mm)):
         table[field] = values
     table["n"], table["epidermis_mm"], table["seed"] = medium.n, medium.epidermis_mm, seed
-    table["wavelength"] = np.rint(np.asarray(medium.wavelength_nm) * 1000)
-    table["block"] = ((part.first // K + estimate) * _GROUPS + pixel // size) * _TURNS + part.turn
+    number = ((part.first // K + estimate) * _GROUPS + pixel // size) * _TURNS + part.turn  # below 2 ** 44
+    table["wavelength"] = np.rint(np.asarray(medium.wavelength_nm) * 1000).astype("u4") | (number >> 32 << 20)
+    table["block"] = number & 0xFFFFFFFF
     table["stride"], table["first"] = part.samples, (pixel - part.begin) * part.samples + estimate * K + k
     table["photons"] = np.minimum(part.end - pixel, size)
     steps = np.minimum(4 * (medium.mu_s_per_mm / medium.nu_per_mm + 1), STEPS_PER_PHOTON)

@@ -8,7 +8,6 @@ counts of rays by kind, of exits without a surface (MISSES) or on one that faces
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,14 +69,15 @@ def empty(size: tuple[int, int], group: int, facts: dict) -> Picture:
 def noise_delta_e(made: Picture, exposure: float = 0.0, seed: int = 0) -> float:
     """Mean CIEDE2000 difference that a pixel's noise makes on the skin, from each pixel's own covariance.
 
-    4,096 pixels that the head covers wholly, the same each time, moved by a random error each; white is 1 under the
-    exposure. Infinite before there are two estimates, 0 where no head is.
+    4,096 pixels that the head covers wholly, or if none is, those it covers most, the same each time, moved by a random
+    error each; white is 1 under the exposure. Infinite before there are two estimates, 0 where no head is.
     """
     if made.estimates < 2:
         return float("inf")
-    rows, columns = np.nonzero(made.mask > 1 - 1e-6)
-    if not len(rows):
+    most = made.mask.max()
+    if most == 0:
         return 0.0
+    rows, columns = np.nonzero(made.mask > (1 - 1e-6 if most > 1 - 1e-6 else 0.5 * most))
     rng = np.random.default_rng(seed)
     some = rng.permutation(len(rows))[:_NOISE_PIXELS]
     part = Picture(made.sums[rows[some], columns[some]][None], made.estimates, made.group, {})
@@ -112,16 +112,6 @@ def read(path: Path) -> Picture:
             raise ValueError("holds NaN")
         return Picture(sums, n, int(facts["group"]), facts)
     except (InputError, KeyError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: not a picture of `lutgen render` ({error}); give another name") from error
-
-
-def check_target(path: Path) -> None:
-    """InputError, before any work, where a picture cannot be written."""
-    if path.suffix.lower() != ".exr":
-        raise InputError(f"out = {path}: the name of an .exr is needed")
-    if path.is_dir():
-        raise InputError(f"out = {path}: is a folder; give the name of an .exr")
-    if not path.parent.is_dir():
-        raise InputError(f"out = {path}: there is no folder {path.parent}; make it first")
-    if not os.access(path.parent, os.W_OK | os.X_OK) or (path.exists() and not os.access(path, os.W_OK)):
-        raise InputError(f"out = {path}: cannot be written; choose another place")
+        raise InputError(
+            f"{path}: not a whole picture of `lutgen render`; give another name, or render it anew"
+        ) from error

@@ -20,7 +20,7 @@ COVERED = 0.99
 class Picture:
     """Linear ACEScg [rows, columns, 3], covariance of its noise [rows, columns, 3, 3] or None, share of skin or None.
 
-    `notes`: what was taken for granted.
+    `notes`: what was taken for granted. `seed`: of the render that it is.
     """
 
     name: str
@@ -28,6 +28,7 @@ class Picture:
     covariance: np.ndarray | None
     skin: np.ndarray | None
     notes: tuple[str, ...] = ()
+    seed: int | None = None
 
 
 def read(path: Path | str) -> Picture:
@@ -66,7 +67,8 @@ def _exr(path: Path) -> Picture:
     skin = next((channels[name].astype("f8") for name in ("mask", "A") if name in channels), None)
     if np.allclose(part.chromaticities, exr.ACESCG, atol=1e-4):
         covariance, notes = _noise(part, rgb, path)
-        return Picture(path.name, rgb, covariance, skin, notes)
+        seed = part.attributes.get("render", {}).get("recipe", {}).get("seed")
+        return Picture(path.name, rgb, covariance, skin, notes, seed)
     if not np.allclose(part.chromaticities, exr.REC709, atol=1e-4):
         raise InputError(f"picture {path}: has other primaries than ACEScg and Rec. 709; convert it")
     return Picture(path.name, _acescg(rgb), None, skin)

@@ -92,7 +92,7 @@ def render(
     held_buffer = ocl.buffer(device, np.zeros((pixels, picture.MOMENTS), "f4"))
     tallies = np.zeros((items(stage, pixels), len(TALLIES)), "u4")
     tally_buffer = ocl.buffer(device, tallies)
-    made, held, noise = start, 0, float("inf")
+    made, held, noise = start, 0, picture.noise_delta_e(start, exposure)
     earlier = start.facts.get("counts", {})
     limit = None if goal.samples is None else -(-goal.samples // group) * group
 
