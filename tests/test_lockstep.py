@@ -9,7 +9,7 @@ import trimesh
 import lutgen
 from lutgen import baking, expansion
 from lutgen import device as ocl
-from lutgen.render import distance, lockstep, queues
+from lutgen.render import distance, lockstep, progressive, queues
 from lutgen.solvers import adding_doubling, path_table
 from lutgen.solvers.path_table import Medium
 from lutgen.tissue import Layer, Skin
@@ -239,6 +239,20 @@ def test_full_walks_have_the_profile_of_the_set(inside, preset):
     assert np.all(np.abs(off) < 4 * whole + 1e-7)
     assert np.all(np.abs(np.cumsum(off, axis=0)) < 4 * np.sqrt(np.cumsum(whole**2, axis=0)) + 1e-6)
     assert np.sqrt(np.sum(whole**2, axis=0)).max() < 0.01 * wanted.sum(axis=0).max()  # else the law says little
+
+
+def test_no_two_blocks_share_a_stream_however_large_the_picture():
+    """The largest picture in the smallest blocks, first and last estimates and turns."""
+    through, pixels = medium(), 4096 * 4096
+    last = progressive.SAMPLES[1] - 1
+    keys = []
+    for begin in (0, 2**20, pixels - 1024):
+        for first in (0, 1, 2**15, last):
+            for turn in (0, 15):
+                table = lockstep.jobs(through, queues.Part(begin, begin + 1024, first, 1, turn), 0, 128)
+                keys += zip(table["wavelength"].tolist(), table["block"].tolist(), strict=True)
+    assert len(keys) == 3 * 4 * 2 * 8
+    assert len(set(keys)) == len(keys)
 
 
 def test_exits_do_not_depend_on_how_a_picture_was_cut():

@@ -201,8 +201,11 @@ def test_sunlit_skin_lights_skin_without_surroundings(walk, specular):
     assert np.all(np.hypot(one, two) < 0.03 * dark)
 
 
-def corner(side: float = 400.0) -> Mesh:
-    """A floor and a wall that meet at a right angle in the x axis, open toward +y and +z."""
+def corner(side: float = 40_000.0) -> Mesh:
+    """A floor and a wall that meet at a right angle in the x axis, open toward +y and +z.
+
+    A wall of 400 mm lacks 3 % of what it mirrors: nearly grazing light, from above its upper end.
+    """
     p = np.array([[-1, 0, 0], [1, 0, 0], [-1, 0, 1], [1, 0, 1], [-1, 0, 0], [1, 0, 0], [-1, 1, 0], [1, 1, 0]], "f4")
     normals = np.repeat(np.array([[0, 1, 0], [0, 0, 1]], "f4"), 4, axis=0)
     return Mesh(p * side, normals, None, np.array([[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6]], "i4"))
@@ -212,7 +215,8 @@ def corner(side: float = 400.0) -> Mesh:
 def test_skin_mirrors_skin_that_mirrors_the_sky(walk, samples):
     """At 45 degrees into a corner of smooth dark skin under an even sky the floor mirrors what the wall mirrors of the
     sky, F^2, and what it scatters, which looks like the floor; and scatters what the wall mirrors: the wall is half of
-    its sky, seen from the wall's normal at cosines z with density 4 / pi sqrt(1 - z^2)."""
+    its sky, seen from the wall's normal at cosines z with density 4 / pi sqrt(1 - z^2). Lobes have a width, over which
+    F is convex, and light goes to and fro more often: 1.4 % at most, measured to 0.15 %."""
     z = (np.arange(4096) + 0.5) / 4096
     f, of_wall = (
         lighting.fresnel(np.array([np.sqrt(0.5)]))[0],
@@ -226,7 +230,7 @@ def test_skin_mirrors_skin_that_mirrors_the_sky(walk, samples):
         found.append(mean(sampled(on, walks.WALKS[walk](on, 0), samples)[0]))
     (plain, one), (shiny, two) = found
     seen, expected = shiny - plain, f * (f + plain) + plain * of_wall
-    assert np.all(np.abs(seen - expected) < SIGMAS * np.hypot(one, two) + 0.06 * expected)  # the lobes have a width
+    assert np.all(np.abs(seen - expected) < SIGMAS * np.hypot(one, two) + 0.02 * expected)
     assert np.all(np.hypot(one, two) < 0.1 * expected)
 
 

@@ -185,12 +185,13 @@ def test_no_pixel_is_nan_whatever_the_mesh_and_light():
         assert np.all(np.isfinite(made.sums))
         assert counts["BROKEN"] == 0
         assert made.mask.max() == 1
-    blazing = EVEN.copy()
-    blazing[1, 3] = np.inf
-    on = opened(shape, replace(SKY, target_mm=(0, 0, 0)), around=blazing)
-    made, counts = sampled(on, walks.flat(on, photons=4096), 10)
-    assert np.all(np.isfinite(made.sums))
-    assert counts["BROKEN"] > 0
+    for radiance in (np.inf, 1e25):  # the second is finite, its square is not
+        blazing = EVEN.copy()
+        blazing[1, 3] = radiance
+        on = opened(shape, replace(SKY, target_mm=(0, 0, 0)), around=blazing)
+        made, counts = sampled(on, walks.flat(on, photons=4096), 10)
+        assert np.all(np.isfinite(made.sums))
+        assert counts["BROKEN"] > 0
     broken = replace(shape, positions_mm=np.where(shape.positions_mm > 79.9, np.nan, shape.positions_mm).astype("f4"))
     on = opened(broken, replace(SUN, target_mm=(0, 0, 0)))
     assert np.all(np.isfinite(sampled(on, walks.flat(on, photons=4096), 10)[0].sums))

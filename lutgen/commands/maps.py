@@ -56,14 +56,15 @@ def maps_of(options: Namespace) -> Outcome:
         progress("invert", None)
         found = inversion.invert(luts, given.linear, fit.eumelanin, fit.gain, given.painted)
         _stop("invert")
-        warnings = [one for one in (warning, no_skin(found, source)) if one is not None]
+        left = mapset.statistics(found)
+        warnings = [one for one in (warning, no_skin(left, source)) if one is not None]
         recolored = None
         if target is not None:
             progress("recolor", None)
             recolored = retarget.recolored(luts, found, given.linear, target)
             _stop("recolor")
         progress("write", None)
-        facts = _facts(luts, given, found, options, target, warnings)
+        facts = _facts(luts, given, found, left, options, target, warnings)
         with folders.whole(options.out, options.force, maps.MADE) as folder:
             made = mapset.layers(luts, found, options.absolute)
             mapset.write(folder, made, options.format, recolored, given.alpha, facts)
@@ -75,9 +76,9 @@ def maps_of(options: Namespace) -> Outcome:
     return result, _text(result, options), 0
 
 
-def no_skin(found: inversion.Inversion, source: Path) -> str | None:
+def no_skin(left: dict, source: Path) -> str | None:
     """A line about colors that few skins have, or None; InputError where half of them are those of none."""
-    left, check = mapset.statistics(found), "are its channels in order, and is it an albedo of skin?"
+    check = "are its channels in order, and is it an albedo of skin?"
     if left["delta_e00_median"] >= NO_SKIN:
         raise InputError(
             f"albedo {source}: its colors are those of no skin (ΔE00 {left['delta_e00_median']:.1f} from the nearest "
@@ -132,7 +133,7 @@ def _number(name: str, text: str) -> float:
 
 
 def _facts(
-    luts: LutSet, given: albedo.Albedo, found: inversion.Inversion, options: Namespace, target, warnings
+    luts: LutSet, given: albedo.Albedo, found: inversion.Inversion, left: dict, options: Namespace, target, warnings
 ) -> dict:
     """What maps.json says besides its files."""
     stops = float(np.mean(np.log2(found.gain)))
@@ -143,7 +144,7 @@ def _facts(
         "skin": dict(zip(maps.RATIOS, found.skin, strict=True)),
         "gain": found.gain.tolist(), "exposure_stops": stops, "balance": (found.gain / 2**stops).tolist(),
         "target": None if target is None else dict(zip(maps.RATIOS, target, strict=True)) | {"named": options.target},
-        "residual": mapset.statistics(found), "out_of_reach_delta_e00": mapset.REACH, "warnings": warnings,
+        "residual": left, "out_of_reach_delta_e00": mapset.REACH, "warnings": warnings,
     }  # fmt: skip
 
 
