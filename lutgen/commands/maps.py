@@ -14,14 +14,13 @@ import lutgen
 from lutgen import folders, maps
 from lutgen.commands import Outcome
 from lutgen.errors import InputError, in_range, one_of
+from lutgen.fitting import NO_SKIN
 from lutgen.lutset import LutSet
 from lutgen.mapping import albedo, balance, inversion, mapset, retarget
 from lutgen.progress import Progress
 from lutgen.tissue import PRESETS
 
 GAINS, STOPS = (0.01, 100.0), (-8.0, 8.0)
-NO_SKIN = 10.0
-"""Median ΔE00 from which on an albedo is refused, as `lutgen fit` refuses a color."""
 _MANY = 0.2
 """Share of texels out of reach that is said."""
 
@@ -77,7 +76,7 @@ def maps_of(options: Namespace) -> Outcome:
 
 
 def no_skin(left: dict, source: Path) -> str | None:
-    """A line about colors that few skins have, or None; InputError where half of them are those of none."""
+    """A line about colors that few skins have, or None; InputError where half are those of none, as `fit` says it."""
     check = "are its channels in order, and is it an albedo of skin?"
     if left["delta_e00_median"] >= NO_SKIN:
         raise InputError(
