@@ -10,30 +10,30 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from lutgen.axes import Axis, Grid
-    from lutgen.baking import bake
-    from lutgen.config import Recipe
     from lutgen.errors import InputError, MachineError
     from lutgen.fitting import Fit, fit
-    from lutgen.lutset import LutSet
-    from lutgen.manifest import save
-    from lutgen.profiles import Profile
+    from lutgen.skin.tissue import PRESETS, Layer, Skin, layers, preset
     from lutgen.solvers import linear_srgb, profile, reflectance, spectrum
+    from lutgen.solvers.profiles import Profile
     from lutgen.solvers.result import Reflectance
-    from lutgen.tissue import PRESETS, Layer, Skin, layers, preset
+    from lutgen.tables.axes import Axis, Grid
+    from lutgen.tables.bake import bake
+    from lutgen.tables.lut_set import LutSet
+    from lutgen.tables.recipe import Recipe
+    from lutgen.tables.storage import save
 
 _WHERE = {
-    "axes": ("Axis", "Grid"),
-    "baking": ("bake",),
-    "config": ("Recipe",),
     "errors": ("InputError", "MachineError"),
     "fitting": ("Fit", "fit"),
-    "lutset": ("LutSet",),
-    "manifest": ("save",),
-    "profiles": ("Profile",),
+    "skin.tissue": ("PRESETS", "Layer", "Skin", "layers", "preset"),
     "solvers": ("linear_srgb", "profile", "reflectance", "spectrum"),
+    "solvers.profiles": ("Profile",),
     "solvers.result": ("Reflectance",),
-    "tissue": ("PRESETS", "Layer", "Skin", "layers", "preset"),
+    "tables.axes": ("Axis", "Grid"),
+    "tables.bake": ("bake",),
+    "tables.lut_set": ("LutSet",),
+    "tables.recipe": ("Recipe",),
+    "tables.storage": ("save",),
 }
 _MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}
 
@@ -65,6 +65,6 @@ def load(path: str | Path | None = None) -> LutSet:
     >>> load().color(0.0195, 0.7, 0.0088).round(2).tolist()
     [0.46, 0.3, 0.2]
     """
-    from lutgen import manifest
+    from lutgen.tables import storage
 
-    return manifest.load(default_luts() if path is None else path)
+    return storage.load(default_luts() if path is None else path)

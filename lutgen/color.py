@@ -51,7 +51,7 @@ def tables() -> dict[str, np.ndarray]:
     >>> tables()["wavelength_nm"].shape
     (81,)
     """
-    lines = (files("lutgen.data") / "color_tables.csv").read_text().splitlines()[1:]
+    lines = (files("lutgen") / "color_tables.csv").read_text().splitlines()[1:]
     values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]]).T
     return dict(zip(lines[0].split(","), values, strict=True))
 

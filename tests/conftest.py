@@ -6,20 +6,21 @@ from dataclasses import replace
 import pytest
 
 import lutgen
-from lutgen import config, manifest
-from lutgen.exports.source import Source
+from lutgen.exports.resampled import Source
+from lutgen.tables import recipe as recipes
+from lutgen.tables import storage
 
 
 @pytest.fixture(scope="session")
 def draft():
     """A set of draft quality."""
-    return lutgen.bake(replace(config.quality("draft"), seed=5))
+    return lutgen.bake(replace(recipes.quality("draft"), seed=5))
 
 
 @pytest.fixture(scope="session")
 def draft_dir(draft, tmp_path_factory):
     """The same set on disk."""
-    return manifest.save(draft, tmp_path_factory.mktemp("luts") / "draft")
+    return storage.save(draft, tmp_path_factory.mktemp("luts") / "draft")
 
 
 @pytest.fixture(scope="session")

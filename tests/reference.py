@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.tissue import Layer
+from lutgen.skin.tissue import Layer
 
 _LINES = (Path(__file__).parent / "reference_two_layer.csv").read_text().splitlines()
 TWO_LAYER = list(csv.DictReader(line for line in _LINES if not line.startswith("#")))

@@ -13,8 +13,9 @@ import pytest
 from PIL import Image
 
 import lutgen
-from lutgen import checking, cli, color, manifest
+from lutgen import cli, color
 from lutgen import device as ocl
+from lutgen.tables import check, storage
 
 
 def run(capsys, *arguments):
@@ -49,7 +50,7 @@ def test_bake_info_check(capsys, tmp_path):
 
 
 def test_an_expanded_set_can_be_saved_shown_and_checked(capsys, draft, tmp_path):
-    out = manifest.save(draft.expand(oxygenation=0.4, extra_absorbers={"dermis": 0.01}), tmp_path / "pale")
+    out = storage.save(draft.expand(oxygenation=0.4, extra_absorbers={"dermis": 0.01}), tmp_path / "pale")
     status, text, _ = run(capsys, "info", out)
     assert status == 0
     assert "oxygenation 0.4" in text
@@ -118,7 +119,7 @@ def test_an_interrupt_is_one_line_status_130(capsys, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lutgen.commands.machine.devices", interrupted)
+    monkeypatch.setattr("lutgen.commands.devices.devices", interrupted)
     status, _, err = run(capsys, "devices")
     assert status == 130
     assert err.count("\n") == 1
@@ -142,10 +143,10 @@ def test_devices_lists_what_is_there(capsys):
 
 
 def test_bench_reports_the_trace_and_the_bakes(capsys, monkeypatch):
-    from lutgen import benchmark
+    from lutgen.tables import bench
 
-    monkeypatch.setattr(benchmark, "ROUNDS", 1)
-    monkeypatch.setattr(benchmark, "_PHOTONS", {"lanes": 8192, "one lane": 2048})
+    monkeypatch.setattr(bench, "ROUNDS", 1)
+    monkeypatch.setattr(bench, "_PHOTONS", {"lanes": 8192, "one lane": 2048})
     status, text, _ = run(capsys, "bench", "--json")
     assert status == 0
     result = json.loads(text)
@@ -208,7 +209,7 @@ def test_bad_input_is_one_line_status_2_and_nothing_written(capsys, tmp_path, mo
 
 
 def test_existing_folder_is_refused_before_any_work(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("lutgen.baking.bake", None)  # calling it would fail otherwise
+    monkeypatch.setattr("lutgen.tables.bake.bake", None)  # calling it would fail otherwise
     status, _, err = run(capsys, "bake", "--out", tmp_path)
     assert status == 2
     assert "exists" in err
@@ -268,7 +269,7 @@ def test_full_disk_is_status_1(capsys, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(manifest.exr, "write", full)
+    monkeypatch.setattr(storage.exr, "write", full)
     status, _, err = run(capsys, "bake", "--quality", "draft", "--photons", 2048, "--out", tmp_path / "x")
     assert status == 1
     assert "No space left on device" in err
@@ -327,11 +328,11 @@ def test_check_names_the_law_that_a_profile_breaks(draft, draft_dir, tmp_path, h
     else:
         clamped[0, 0, 0, 2] = 0.02
     harmed = replace(draft, profile_lut=replace(draft.profile_lut, shape=shape, clamped_share=clamped))
-    manifest.exr.write(folder / "profile.exr", manifest._parts(harmed)["profile.exr"])
+    storage.exr.write(folder / "profile.exr", storage._parts(harmed)["profile.exr"])
     facts = json.loads((folder / "manifest.json").read_text())
     facts["files"]["profile.exr"] = hashlib.sha256((folder / "profile.exr").read_bytes()).hexdigest()
     (folder / "manifest.json").write_text(json.dumps(facts))
-    failed = {finding.name for finding in checking.check(folder) if not finding.passed}
+    failed = {finding.name for finding in check.check(folder) if not finding.passed}
     assert {"nan": "profile values", "sums": "profile sums", "clamped": "clamped share"}[harm] in failed
 
 
@@ -352,7 +353,7 @@ def test_check_finds_what_is_wrong(capsys, draft, draft_dir, tmp_path, harm):
         else:
             cells[0, 0, 0, 0] = np.nan
         harmed = replace(draft, color_lut=replace(draft.color_lut, acescg=cells))
-        manifest.exr.write(folder / "color.exr", manifest._parts(harmed)["color.exr"])
+        storage.exr.write(folder / "color.exr", storage._parts(harmed)["color.exr"])
         facts = json.loads((folder / "manifest.json").read_text())
         facts["files"]["color.exr"] = hashlib.sha256((folder / "color.exr").read_bytes()).hexdigest()
         (folder / "manifest.json").write_text(json.dumps(facts))
@@ -362,6 +363,6 @@ def test_check_finds_what_is_wrong(capsys, draft, draft_dir, tmp_path, harm):
 
 
 def test_check_allows_what_chance_allows(draft_dir):
-    nodes = next(f for f in checking.check(draft_dir) if f.name == "nodes")
+    nodes = next(f for f in check.check(draft_dir) if f.name == "nodes")
     assert nodes.passed
     assert "100 random nodes" in nodes.detail

@@ -6,7 +6,7 @@ import pytest
 
 import lutgen
 from lutgen import color
-from lutgen.data import make_color
+from lutgen.tables import make_color
 
 NM = np.arange(380, 781, 5)
 

@@ -8,14 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr, folders, scene, subject
 from lutgen.errors import InputError, cannot_write
-from lutgen.lutset import LutSet
-from lutgen.maps import Maps
-from lutgen.mesh import Mesh
-from lutgen.scene import Look
+from lutgen.files import exr, folders
+from lutgen.files.texture_maps import Maps
+from lutgen.head.mesh import Mesh
+from lutgen.scene import look as looks
+from lutgen.scene import subject
+from lutgen.scene.look import Look
+from lutgen.tables.lut_set import LutSet
 
-from . import passes, stages
+from . import passes
+from . import stage as stages
 
 SIZE = (1280, 720)
 
@@ -52,11 +55,11 @@ def sheet(stage: stages.Stage, look: Look, columns: int = 3, progress: Callable 
     """Every preset beside the others, [rows x height, columns x width, 3], each with its name."""
     from PIL import Image, ImageDraw
 
-    looks = scene.sheet_looks(look)
+    sheet_looks = looks.sheet_looks(look)
     width, height = stage.size
-    rows = -(-len(looks) // columns)
+    rows = -(-len(sheet_looks) // columns)
     whole = Image.new("RGB", (columns * width, rows * height))
-    for i, (name, one) in enumerate(looks.items()):
+    for i, (name, one) in enumerate(sheet_looks.items()):
         progress(name)
         frame = Image.fromarray(picture(stage, one))
         ImageDraw.Draw(frame).text((10, height - 20), name, fill=(220, 220, 220))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lutgen.lighting import STUDIO, exit_means
+from lutgen.scene.light import STUDIO, exit_means
 
 
 def constants() -> str:

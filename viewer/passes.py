@@ -7,12 +7,19 @@ from collections.abc import Iterable
 import moderngl
 import numpy as np
 
-from lutgen import color, environment, lighting, maps, pores, scene
+from lutgen import color
 from lutgen.errors import in_range
-from lutgen.scene import Look
+from lutgen.files import texture_maps
+from lutgen.head import pores
+from lutgen.scene import environment
+from lutgen.scene import light as lighting
+from lutgen.scene import look as looks
+from lutgen.scene.look import Look
 
-from . import clock, gl, sides, stages
-from .stages import REFLECTED, SAMPLES, Stage
+from . import gl, lut_sides
+from . import stage as stages
+from .measure import clock
+from .stage import REFLECTED, SAMPLES, Stage
 
 TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
 REFERENCE_FRAMES = 16
@@ -24,7 +31,7 @@ def set_oxygenation(stage: Stage, oxygenation: float) -> None:
         return
     for name in ("none", "set"):
         if name in stage.sides:
-            sides.expand(stage.sides[name], oxygenation)
+            lut_sides.expand(stage.sides[name], oxygenation)
     stage.oxygenation = oxygenation
 
 
@@ -47,7 +54,7 @@ def draw(stage: Stage, look: Look, frame: int | None = None) -> None:
     All its frames, or one more of them: `frame` 0 starts anew, a later one adds to what is there.
     """
     require(stage, look)
-    camera = scene.camera(look, *stage.size)
+    camera = looks.camera(look, *stage.size)
     clock.start(stage.timer)
     if not frame:
         set_oxygenation(stage, look.oxygenation)
@@ -62,7 +69,7 @@ def draw(stage: Stage, look: Look, frame: int | None = None) -> None:
     gl.check()
 
 
-def _halves(stage: Stage, look: Look, camera: scene.Camera, added: Iterable[int]) -> None:
+def _halves(stage: Stage, look: Look, camera: looks.Camera, added: Iterable[int]) -> None:
     width, height = (n * SAMPLES for n in stage.size)
     halves = [(0, width)] if look.split == "none" else [(0, width // 2), (width // 2, width)]
     for k, (left, right) in enumerate(halves):
@@ -72,10 +79,10 @@ def _halves(stage: Stage, look: Look, camera: scene.Camera, added: Iterable[int]
 
 def _light_clip(stage: Stage, look: Look) -> np.ndarray:
     """Orthographic clip space that the light sees the whole head in."""
-    way, radius = scene.light_direction(look), stage.radius_mm
+    way, radius = looks.light_direction(look), stage.radius_mm
     box = np.diag([1 / radius, 1 / radius, -1 / (1.5 * radius), 1.0])
     box[2, 3] = -4 / 3
-    return box @ scene.look_at(stage.center_mm + 2 * radius * way, stage.center_mm)
+    return box @ looks.look_at(stage.center_mm + 2 * radius * way, stage.center_mm)
 
 
 def cast_shadow(stage: Stage, look: Look) -> None:
@@ -98,7 +105,7 @@ def skin_of(stage: Stage, look: Look) -> dict:
     axes = grid.melanin, grid.eumelanin, grid.hemoglobin
     return {
         "chromophores": (look.melanin, look.eumelanin, look.hemoglobin),
-        "contrast": maps.contrast(stage.full_contrast_melanin, look.melanin),
+        "contrast": texture_maps.contrast(stage.full_contrast_melanin, look.melanin),
         "chromophores_low": tuple(a.low for a in axes), "chromophores_high": tuple(a.high for a in axes),
     }  # fmt: skip
 
@@ -115,7 +122,7 @@ def from_skin(stage: Stage, look: Look) -> np.ndarray:
 
 
 def draw_surface(
-    stage: Stage, look: Look, camera: scene.Camera, program: moderngl.Program, seen: moderngl.VertexArray,
+    stage: Stage, look: Look, camera: looks.Camera, program: moderngl.Program, seen: moderngl.VertexArray,
     buffer: moderngl.Framebuffer, **more: moderngl.Texture,
 ) -> None:  # fmt: skip
     """Draw the head with a surface program into its buffer; `more` textures are its own."""
@@ -134,7 +141,7 @@ def draw_surface(
     gl.put(
         program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
         shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
-        light_direction=scene.light_direction(look), light_color=look.light * lighting.SUN, eye=camera.eye_mm,
+        light_direction=looks.light_direction(look), light_color=look.light * lighting.SUN, eye=camera.eye_mm,
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
         environment_entry=lighting.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
@@ -146,7 +153,7 @@ def draw_surface(
 
 
 def _scatter(
-    stage: Stage, look: Look, camera: scene.Camera, split: str, scissor: tuple[int, int, int, int], frame: int
+    stage: Stage, look: Look, camera: looks.Camera, split: str, scissor: tuple[int, int, int, int], frame: int
 ) -> None:
     one, targets, buffer = stages.side(stage, split), stage.targets, stage.targets["scattered_buffer"]
     program, tables = one.gather.program, one.textures

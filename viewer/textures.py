@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from lutgen import burley, glsl, profiles
-from lutgen.lutset import LutSet
+from lutgen.solvers import burley, profiles
+from lutgen.tables import shader_axes
+from lutgen.tables.lut_set import LutSet
 
 from . import gl
 
@@ -113,8 +114,8 @@ def functions(luts: LutSet) -> str:
     """GLSL that finds the textures' coordinates of a skin."""
     low, high = np.log(RADIUS_MM)
     return "\n".join([
-        glsl.grid_functions(luts.color_lut.grid, "color"),
-        glsl.grid_functions(luts.profile_lut.grid, "profile"),
+        shader_axes.grid_functions(luts.color_lut.grid, "color"),
+        shader_axes.grid_functions(luts.profile_lut.grid, "profile"),
         f"const float QUANTILE_COUNT = {QUANTILES}.0, RADIUS_COUNT = {RADII}.0;",
         f"const float LOG_RADIUS_LOW = {low:.9g}, LOG_RADIUS_SPAN = {high - low:.9g};",
     ])  # fmt: skip

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.axes import Axis
 from lutgen.errors import InputError, MachineError
+from lutgen.tables.axes import Axis
 
 INK, GRAY, RULE = "#1a1a1a", "#595959", "#dddddd"
 HUES = ("#0072b2", "#d55e00", "#009e73", "#a0457e", "#8a6d00", "#1a1a1a")

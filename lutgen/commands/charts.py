@@ -8,26 +8,26 @@ from functools import partial
 from pathlib import Path
 
 from lutgen.commands import Outcome
-from lutgen.progress import Progress
+from lutgen.commands.progress import Progress
 
 
 def figures(options: Namespace) -> Outcome:
     """`lutgen figures`: the source document's results, and what they are compared with, as charts and tables."""
-    from lutgen.charts import figures as charts
+    from lutgen.charts.document import figures as charts
 
     return _drawn(options, charts.draw)
 
 
 def chart(options: Namespace) -> Outcome:
     """`lutgen chart`: speed against accuracy."""
-    from lutgen.charts import chart as charts
+    from lutgen.charts.accuracy import chart as charts
 
     return _drawn(options, partial(charts.draw, quick=options.quick))
 
 
 def stability(options: Namespace) -> Outcome:
     """`lutgen stability`: error maps, bias and the failure list."""
-    from lutgen.charts import stability as charts
+    from lutgen.charts.stability import stability as charts
 
     return _drawn(options, partial(charts.draw, quick=options.quick))
 

@@ -8,27 +8,28 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lutgen import folders
 from lutgen.commands import Outcome
 from lutgen.errors import InputError
+from lutgen.files import folders
 
 if TYPE_CHECKING:
-    from lutgen.render.difference import Difference
+    from lutgen.render.compare import Difference
 
 
 def compare(options: Namespace) -> Outcome:
     """`lutgen compare`: how far B is from A, without their noise."""
-    from lutgen.render import beside, difference, pictures
+    from lutgen.render import compare as difference
+    from lutgen.render import compare_files, compare_picture
 
     if options.png is not None:
         folders.check_file("png", options.png, ".png")
         if any(Path(options.png).resolve() == Path(one).resolve() for one in (options.a, options.b)):
             raise InputError(f"png = {options.png}: is one of the pictures to compare; give another name")
-    a, b = pictures.read(options.a), pictures.read(options.b)
+    a, b = compare_files.read(options.a), compare_files.read(options.b)
     found = difference.compare(a, b)
     if options.png is not None:
         with folders.whole_file("png", options.png) as partial:
-            beside.draw(a, b, found).save(partial, format="PNG")
+            compare_picture.draw(a, b, found).save(partial, format="PNG")
     names = "mean", "median", "p95"
     result = {
         "a": options.a, "b": options.b, "size": list(a.acescg.shape[1::-1]), "boxes": found.boxes,

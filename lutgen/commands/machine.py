@@ -29,7 +29,7 @@ def bench(options: Namespace) -> Outcome:
         return pictures.bench(options)
     if options.size is not None:
         raise InputError(f"size = {options.size}: only frames have a size; add --viewer")
-    from lutgen import benchmark
+    from lutgen.tables import bench as benchmark
 
     result = benchmark.run(options.device)
     trace, baked = result["trace"], result["bake"]

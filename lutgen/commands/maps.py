@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 
 import lutgen
-from lutgen import folders, maps
 from lutgen.commands import Outcome
+from lutgen.commands.progress import Progress
 from lutgen.errors import InputError, in_range, one_of
-from lutgen.fitting import NO_SKIN
-from lutgen.lutset import LutSet
-from lutgen.mapping import albedo, balance, inversion, mapset, retarget
-from lutgen.progress import Progress
-from lutgen.tissue import PRESETS
+from lutgen.files import folders, texture_maps
+from lutgen.fitting import NO_SKIN, albedo, albedo_to_skin, maps_folder, recolor, white_balance
+from lutgen.skin.tissue import PRESETS
+from lutgen.tables.lut_set import LutSet
 
 GAINS, STOPS = (0.01, 100.0), (-8.0, 8.0)
 _MANY = 0.2
@@ -27,10 +26,10 @@ _MANY = 0.2
 
 def maps_of(options: Namespace) -> Outcome:
     """`lutgen maps`: an albedo to a folder of maps."""
-    one_of("format", options.format, mapset.FORMATS)
+    one_of("format", options.format, maps_folder.FORMATS)
     start, free = light(options.balance, options.exposure)
     source = Path(options.albedo)
-    out = folders.check_target(options.out, options.force, maps.MADE)
+    out = folders.check_target(options.out, options.force, texture_maps.MADE)
     if source.resolve().is_relative_to(out):
         raise InputError(f"out = {options.out}: holds the albedo {source}, which would go; give another folder")
     clock, seconds = time.perf_counter(), {}
@@ -43,30 +42,30 @@ def maps_of(options: Namespace) -> Outcome:
     with Progress(quiet=options.json) as progress:
         luts = lutgen.load(options.luts)
         eumelanin = None if options.eumelanin == "auto" else _number("eumelanin", options.eumelanin)
-        candidates = inversion.ratios_of(luts, eumelanin)
+        candidates = albedo_to_skin.ratios_of(luts, eumelanin)
         target = None if options.target is None else target_of(luts, options.target)
         progress("read the albedo", None)
         given = albedo.read(source, options.encoding)
         _stop("read")
         progress("fit the light", None)
         warning = albedo.doubt(luts, given)
-        fit = balance.fitted(luts, given.linear[given.painted], candidates, start, free)
+        fit = white_balance.fitted(luts, given.linear[given.painted], candidates, start, free)
         _stop("fit")
         progress("invert", None)
-        found = inversion.invert(luts, given.linear, fit.eumelanin, fit.gain, given.painted)
+        found = albedo_to_skin.invert(luts, given.linear, fit.eumelanin, fit.gain, given.painted)
         _stop("invert")
-        left = mapset.statistics(found)
+        left = maps_folder.statistics(found)
         warnings = [one for one in (warning, no_skin(left, source)) if one is not None]
         recolored = None
         if target is not None:
             progress("recolor", None)
-            recolored = retarget.recolored(luts, found, given.linear, target)
+            recolored = recolor.recolored(luts, found, given.linear, target)
             _stop("recolor")
         progress("write", None)
         facts = _facts(luts, given, found, left, options, target, warnings)
-        with folders.whole(options.out, options.force, maps.MADE) as folder:
-            made = mapset.layers(luts, found, options.absolute)
-            mapset.write(folder, made, options.format, recolored, given.alpha, facts)
+        with folders.whole(options.out, options.force, texture_maps.MADE) as folder:
+            made = maps_folder.layers(luts, found, options.absolute)
+            maps_folder.write(folder, made, options.format, recolored, given.alpha, facts)
             _preview(folder / "preview.png", luts, given.linear * found.gain, found, made, facts, recolored)
         _stop("write")
     seconds["total"] = round(sum(seconds.values()), 4)
@@ -85,7 +84,9 @@ def no_skin(left: dict, source: Path) -> str | None:
         )
     if left["out_of_reach_share"] < _MANY:
         return None
-    return f"{left['out_of_reach_share']:.0%} of the texels are farther than {mapset.REACH:g} from any skin: {check}"
+    return (
+        f"{left['out_of_reach_share']:.0%} of the texels are farther than {maps_folder.REACH:g} from any skin: {check}"
+    )
 
 
 def light(wanted: str, exposure: str | None) -> tuple[np.ndarray, str]:
@@ -132,7 +133,13 @@ def _number(name: str, text: str) -> float:
 
 
 def _facts(
-    luts: LutSet, given: albedo.Albedo, found: inversion.Inversion, left: dict, options: Namespace, target, warnings
+    luts: LutSet,
+    given: albedo.Albedo,
+    found: albedo_to_skin.Inversion,
+    left: dict,
+    options: Namespace,
+    target,
+    warnings,
 ) -> dict:
     """What maps.json says besides its files."""
     stops = float(np.mean(np.log2(found.gain)))
@@ -140,15 +147,16 @@ def _facts(
     return {
         "lutgen": version("lutgen"), "albedo": Path(options.albedo).name, "size": [columns, rows],
         "encoding": given.encoding, "oxygenation": luts.oxygenation,
-        "skin": dict(zip(maps.RATIOS, found.skin, strict=True)),
+        "skin": dict(zip(texture_maps.RATIOS, found.skin, strict=True)),
         "gain": found.gain.tolist(), "exposure_stops": stops, "balance": (found.gain / 2**stops).tolist(),
-        "target": None if target is None else dict(zip(maps.RATIOS, target, strict=True)) | {"named": options.target},
-        "residual": left, "out_of_reach_delta_e00": mapset.REACH, "warnings": warnings,
+        "target": None if target is None else dict(zip(texture_maps.RATIOS, target, strict=True))
+        | {"named": options.target},
+        "residual": left, "out_of_reach_delta_e00": maps_folder.REACH, "warnings": warnings,
     }  # fmt: skip
 
 
 def _preview(path: Path, luts: LutSet, balanced, found, made, facts: dict, recolored) -> None:
-    from lutgen.mapping import sheet
+    from lutgen.fitting import maps_preview
 
     left = facts["residual"]
     words = (
@@ -157,7 +165,7 @@ def _preview(path: Path, luts: LutSet, balanced, found, made, facts: dict, recol
         f"out of reach {left['out_of_reach_share']:.1%}"
     )
     name = facts["target"]["named"] if facts["target"] else ""
-    sheet.draw(luts, balanced, found, made, words, recolored, name).save(path, compress_level=3)
+    maps_preview.draw(luts, balanced, found, made, words, recolored, name).save(path, compress_level=3)
 
 
 def _text(result: dict, options: Namespace) -> str:
@@ -175,8 +183,8 @@ def _text(result: dict, options: Namespace) -> str:
     ]  # fmt: skip
     if options.format == "png" and left["beyond_png_ratio_share"] > 0:
         lines.append(
-            f"{left['beyond_png_ratio_share']:.2%} of texels have more than {maps.RATIO_RANGE:g} times the median, the "
-            "most that PNG holds; --format exr keeps them"
+            f"{left['beyond_png_ratio_share']:.2%} of texels have more than {texture_maps.RATIO_RANGE:g} times "
+            "the median, the most that PNG holds; --format exr keeps them"
         )
     lines.append(", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
                  + f"; inverted in {result['invert_us_per_pixel']:.2f} µs a pixel")  # fmt: skip

@@ -13,13 +13,15 @@ from types import ModuleType
 import numpy as np
 
 import lutgen
-from lutgen import extras, manifest, scene, subject
 from lutgen.commands import Outcome
 from lutgen.errors import InputError, one_of
-from lutgen.lutset import LutSet
-from lutgen.maps import Maps
-from lutgen.mesh import Mesh
-from lutgen.scene import Look
+from lutgen.files.texture_maps import Maps
+from lutgen.head.mesh import Mesh
+from lutgen.scene import look as looks
+from lutgen.scene import subject, viewer
+from lutgen.scene.look import Look
+from lutgen.tables import storage
+from lutgen.tables.lut_set import LutSet
 
 SHEET_SIZE = "480x480"
 PICTURE_SIZE = "1280x720"
@@ -28,21 +30,21 @@ TIMED_SIZE = "640x360"
 
 def look_of(options: Namespace) -> Look:
     """The look that --look, --preset and --set give, in that order."""
-    look = scene.load(Path(options.look)) if options.look else Look()
+    look = looks.load(Path(options.look)) if options.look else Look()
     if options.preset is not None:
-        look = scene.of_preset(options.preset, look)
+        look = looks.of_preset(options.preset, look)
     values = {}
     for text in options.set:
         name, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"--set {text}: NAME=VALUE is needed, for example melanin=0.05")
         values[name.strip().replace("-", "_")] = value.strip()
-    return scene.changed(look, values)
+    return looks.changed(look, values)
 
 
 def shown_of(options: Namespace, look: Look) -> tuple[LutSet, Mesh, Maps, np.ndarray | None, tuple[str, ...]]:
     """What the options describe: LUT set, head, maps, light from all around, and what is to be said about the head."""
-    luts = lutgen.load() if options.dir is None else manifest.load(Path(options.dir))
+    luts = lutgen.load() if options.dir is None else storage.load(Path(options.dir))
     one_of("albedo", options.albedo, subject.ALBEDO)
     around = subject.surroundings_of(options.environment, options.normalize_environment)
     shape, given = subject.model(options.mesh, options.mm_per_unit, options.maps, options.flip_v)
@@ -55,7 +57,7 @@ def shown_of(options: Namespace, look: Look) -> tuple[LutSet, Mesh, Maps, np.nda
 
 def _opener(options: Namespace, app: ModuleType, look: Look) -> tuple[Callable, tuple[str, ...]]:
     """What opens the stage that the options describe at a size in pixels, and what is to be said about its head."""
-    other = None if options.compare is None else manifest.load(Path(options.compare))
+    other = None if options.compare is None else storage.load(Path(options.compare))
     luts, shape, given, around, notes = shown_of(options, look)
     return partial(app.open_stage, luts, shape, given, other=other, around=around), notes
 
@@ -67,16 +69,16 @@ def _stage(opened: Callable, size: tuple[int, int]) -> Iterator:
     try:
         yield stage
     finally:
-        extras.viewer("stages").release(stage)
+        viewer.viewer("stage").release(stage)
 
 
 def view(options: Namespace) -> Outcome:
     """Open a window, or draw one picture."""
-    look, app = look_of(options), extras.viewer("app")
+    look, app = look_of(options), viewer.viewer("app")
     size = subject.size_of(options.size or PICTURE_SIZE)
     opened, notes = _opener(options, app, look)
     if options.screenshot is None:
-        look = extras.viewer("window").run(opened, look, size, notes)
+        look = viewer.viewer("window.window").run(opened, look, size, notes)
         return {"look": asdict(look), "notes": list(notes)}, "\n".join(notes) or "closed", 0
     with _stage(opened, size) as stage:
         app.screenshot(stage, look, options.screenshot)
@@ -86,20 +88,20 @@ def view(options: Namespace) -> Outcome:
 
 def sheet(options: Namespace) -> Outcome:
     """Draw every preset beside the others."""
-    look, app = look_of(options), extras.viewer("app")
+    look, app = look_of(options), viewer.viewer("app")
     size = subject.size_of(options.size or SHEET_SIZE)
     opened, notes = _opener(options, app, look)
     with _stage(opened, size) as stage:
         pixels = app.sheet(stage, look)
     app.write(pixels, options.out)
-    said = {"sheet": options.out, "presets": list(scene.PRESETS), "notes": list(notes)}
-    shown = f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(scene.PRESETS)} presets"
+    said = {"sheet": options.out, "presets": list(looks.PRESETS), "notes": list(notes)}
+    shown = f"{options.out}: {pixels.shape[1]} x {pixels.shape[0]}, {len(looks.PRESETS)} presets"
     return said, "\n".join([shown, *notes]), 0
 
 
 def bench(options: Namespace) -> Outcome:
     """Time the built-in head: milliseconds by pass and tier, and over the same head without LUT and scattering."""
-    timing = extras.viewer("timing")
+    timing = viewer.viewer("measure.timing")
     size = subject.size_of(options.size or TIMED_SIZE)
     result = timing.report(lutgen.load(), *subject.model(None, None, None), size)
     return result, _table(result), 0

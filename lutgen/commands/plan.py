@@ -8,13 +8,13 @@ from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
 
-from lutgen import config, planning
 from lutgen.commands import Outcome
+from lutgen.commands.progress import Progress
 from lutgen.errors import InputError, cannot_write
 from lutgen.planning import costs
-from lutgen.planning.explaining import Plan
 from lutgen.planning.needs import Needs, scene
-from lutgen.progress import Progress
+from lutgen.planning.plan import Plan, least
+from lutgen.tables import recipe as recipes
 
 STATISTIC = (
     "95th percentile over random skins of the scene (log-uniform melanin and hemoglobin); profiles: over ACEScg "
@@ -30,7 +30,7 @@ def plan(options: Namespace) -> Outcome:
         _check(options.write, options.force)
     with Progress(quiet=options.json) as progress:
         progress("plan", None)
-        found = planning.plan(needs)
+        found = least(needs)
         measured = _verified(found, progress, options.device) if options.verify else None
     result = _result(found) | ({} if measured is None else {"measured": measured})
     lines = _lines(found) + (_compared(found, measured) if measured else [])
@@ -101,16 +101,16 @@ def _viewer(found: Plan) -> str:
 
 def _verified(found: Plan, progress: Progress, device: str | None) -> dict:
     """The recipe baked with eight seeds, and what it errs by."""
-    from lutgen.planning import verifying
+    from lutgen.planning import verify
 
     needs, recipe = found.needs, found.recipe
     progress("reference", None)
-    photons = verifying.reference_photons(recipe)
-    right = verifying.truth(needs, recipe, verifying.reference(photons, device))
-    measured = verifying.verify(needs, recipe, right, found.profile, progress=progress, device=device)
+    photons = verify.reference_photons(recipe)
+    right = verify.truth(needs, recipe, verify.reference(photons, device))
+    measured = verify.verify(needs, recipe, right, found.profile, progress=progress, device=device)
     return asdict(measured) | {
         "holds": measured.holds(needs), "seeds": [recipe.seed + k for k in range(len(measured.color))],
-        "reference_photons": photons, "reference_seed": verifying.REFERENCE_SEED, "skins_seed": verifying.SKINS_SEED,
+        "reference_photons": photons, "reference_seed": verify.REFERENCE_SEED, "skins_seed": verify.SKINS_SEED,
     }  # fmt: skip
 
 
@@ -143,7 +143,7 @@ def _toml(found: Plan) -> str:
         f"most {found.profile_error['at most']:.2g}; bake {found.cost[0]:.2f} s.\n"
         f"# {STATISTIC}.\n"
         + ("" if found.profile else "# No profile is needed: let the viewer not scatter (tier=off).\n")
-        + config.toml(found.recipe)
+        + recipes.toml(found.recipe)
     )
 
 

@@ -15,14 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import folders, subject
 from lutgen.commands import Outcome
 from lutgen.commands.pictures import look_of, shown_of
+from lutgen.commands.progress import Progress
 from lutgen.errors import InputError, one_of, whole
-from lutgen.maps import Maps
-from lutgen.paths import SEEDS
-from lutgen.progress import Progress
-from lutgen.scene import Look
+from lutgen.files import folders
+from lutgen.files.texture_maps import Maps
+from lutgen.scene import subject
+from lutgen.scene.look import Look
+from lutgen.solvers.paths import SEEDS
 
 SIZE = "512x512"
 INTERRUPTED = 130
@@ -35,11 +36,12 @@ _NOT_SEEN = ("tier", "split", "transmission", "exposure")
 def render(options: Namespace) -> Outcome:
     """`lutgen render`: sample until --spp, --time or --noise, go on where the same command stopped before."""
     from lutgen import device as ocl
-    from lutgen.render import picture, progressive, soundness, stage, walks
+    from lutgen.head import soundness
+    from lutgen.render import device_scene, film, flat_walk, progressive
 
     since = time.perf_counter()
     goal = progressive.goal_of(options.spp, options.time, options.noise)
-    one_of("walk", options.walk, tuple(walks.WALKS))
+    one_of("walk", options.walk, tuple(flat_walk.WALKS))
     seed, size = whole("seed", options.seed, *SEEDS), subject.size_of(options.size or SIZE)
     look, out = look_of(options), folders.check_file("out", options.out, ".exr")
     if options.png is not None:
@@ -55,19 +57,19 @@ def render(options: Namespace) -> Outcome:
         "head": _hash(shape.positions_mm, shape.normals, shape.uv, shape.triangles), "maps": _hash_of(given),
         "environment": "studio" if around is None else _hash(around),
     }  # fmt: skip
-    before = None if options.force or not out.exists() else _same(picture.read(out), recipe, out)
+    before = None if options.force or not out.exists() else _same(film.read(out), recipe, out)
     seconds = {"head": time.perf_counter() - since}
     with Progress(quiet=options.json) as progress, _interruptible() as stopped:
-        opened = _timed(seconds, "tree", lambda: stage.open_stage(
+        opened = _timed(seconds, "tree", lambda: device_scene.open_stage(
             device, luts, shape, given, look, size, around, seed))  # fmt: skip
-        walk = _timed(seconds, "exits", lambda: walks.WALKS[options.walk](opened, seed))
+        walk = _timed(seconds, "exits", lambda: flat_walk.WALKS[options.walk](opened, seed))
         notes = (*notes, *walk.facts.get("notes", ()))
         facts = {"recipe": recipe, "walk": walk.facts, "notes": list(notes), "device": device.name}
-        start = picture.empty(size, walk.group, facts) if before is None else before
+        start = film.empty(size, walk.group, facts) if before is None else before
 
-        def save(made: picture.Picture, noise: float) -> None:
+        def save(made: film.Picture, noise: float) -> None:
             """Write what there is so far."""
-            picture.write(made, out)
+            film.write(made, out)
             if options.png:
                 _write_png(made, look, options.png)
 
@@ -155,9 +157,8 @@ def _interruptible() -> Iterator[Callable[[], bool]]:
 
 def _kernels() -> str:
     """A mark of the kernels' text, on which every sample depends."""
-    folder = files("lutgen.kernels")
-    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".cl"))
-    return hashlib.sha256("".join((folder / name).read_text() for name in names).encode()).hexdigest()[:16]
+    texts = [path.read_text() for path in sorted(Path(str(files("lutgen.kernels"))).rglob("*.cl"))]
+    return hashlib.sha256("".join(texts).encode()).hexdigest()[:16]
 
 
 def _hash(*arrays: np.ndarray | None) -> str:
@@ -207,7 +208,7 @@ def _short(value: object) -> str:
 def _write_png(made, look: Look, name: str) -> None:
     from PIL import Image
 
-    from lutgen import tone
+    from lutgen.scene import display
 
     with folders.whole_file("png", name) as partial:
-        Image.fromarray(tone.picture(made.rgb, made.mask, look.exposure)).save(partial, format="PNG")
+        Image.fromarray(display.picture(made.rgb, made.mask, look.exposure)).save(partial, format="PNG")

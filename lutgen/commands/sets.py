@@ -8,9 +8,11 @@ from argparse import Namespace
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from lutgen import config, folders, manifest
 from lutgen.commands import Outcome
-from lutgen.progress import Progress
+from lutgen.commands.progress import Progress
+from lutgen.files import folders
+from lutgen.tables import recipe as recipes
+from lutgen.tables import storage
 
 
 def seconds_since_start() -> float:
@@ -26,11 +28,11 @@ def seconds_since_start() -> float:
 
 def bake(options: Namespace) -> Outcome:
     """`lutgen bake`: recipe and options to a folder."""
-    from lutgen import baking
+    from lutgen.tables import bake as baking
 
     imports = seconds_since_start()
-    base = config.quality(options.quality)
-    recipe = config.load(options.recipe, base) if options.recipe else base
+    base = recipes.quality(options.quality)
+    recipe = recipes.load(options.recipe, base) if options.recipe else base
     changes = {key: getattr(options, key) for key in ("photons", "wavelengths", "seed")}
     recipe = replace(recipe, **{key: value for key, value in changes.items() if value is not None})
     out = folders.check_target(options.out, options.force)
@@ -40,7 +42,7 @@ def bake(options: Namespace) -> Outcome:
         written = time.perf_counter()
         luts.manifest["seconds"] = {"imports": round(imports, 4), **luts.manifest["seconds"]}
         notes = {"host": f"{platform.system()} {platform.machine()}", "baked_at": time.strftime("%Y-%m-%dT%H:%M:%S%z")}
-        manifest.save(luts, out, options.force, notes)
+        storage.save(luts, out, options.force, notes)
     seconds = luts.manifest["seconds"] | {
         "write": round(time.perf_counter() - written, 4), "total": round(seconds_since_start(), 4),
     }  # fmt: skip
@@ -62,7 +64,7 @@ def bake(options: Namespace) -> Outcome:
 def info(options: Namespace) -> Outcome:
     """`lutgen info`: the manifest, in words."""
     folder = Path(options.dir)
-    luts = manifest.load(folder)
+    luts = storage.load(folder)
     facts = luts.manifest
     lines = [f"{folder.absolute()}: LUT set of lutgen {facts['lutgen']}, {facts['recipe']['totals']} totals"]
     for name, grid in (("color", luts.color_lut.grid), ("profile", luts.profile_lut.grid)):
@@ -84,14 +86,14 @@ def info(options: Namespace) -> Outcome:
         )
     else:
         lines.append("color: expanded from stored paths, its error not measured")
-    sizes = {name: (folder / name).stat().st_size for name in manifest.EXR_FILES}
+    sizes = {name: (folder / name).stat().st_size for name in storage.EXR_FILES}
     lines += [f"{name}: {size / 1000:.0f} kB" for name, size in sizes.items()]
     return facts | {"bytes": sizes}, "\n".join(lines), 0
 
 
 def check(options: Namespace) -> Outcome:
     """`lutgen check`: every law that a LUT set must obey."""
-    from lutgen import checking
+    from lutgen.tables import check as checking
 
     findings = checking.check(Path(options.dir))
     good = all(finding.passed for finding in findings)

@@ -14,7 +14,7 @@ from lutgen.fitting.measured import GRAMMAR
 
 if TYPE_CHECKING:
     from lutgen.fitting import Fit
-    from lutgen.tissue import Skin
+    from lutgen.skin.tissue import Skin
 
 _FIELDS = ("melanin", "eumelanin", "hemoglobin", "oxygenation", "epidermis_mm", "scattering", "reading",
            "saidi_a_per_mm", "saidi_b_nm4_per_mm")  # fmt: skip
@@ -37,7 +37,7 @@ def swatch(options: Namespace) -> Outcome:
     """`lutgen swatch`: one skin's spectrum and color."""
     from lutgen import device as ocl
     from lutgen import solvers
-    from lutgen.tissue import Skin, preset
+    from lutgen.skin.tissue import Skin, preset
 
     given = _given(options)
     if options.preset is None and "melanin" not in given:
@@ -70,7 +70,7 @@ def swatch(options: Namespace) -> Outcome:
 def _draw(options: Namespace, picture: Callable) -> None:
     """Write what `picture(lutgen.preview)` draws to --png, if it is asked for."""
     if options.png is not None:
-        from lutgen import preview
+        from lutgen.tables import preview
 
         try:
             picture(preview).save(options.png, format="PNG")
@@ -82,7 +82,7 @@ def fit(options: Namespace) -> Outcome:
     """`lutgen fit`: the skin of a measured spectrum or color."""
     from lutgen import fitting
     from lutgen.fitting import measured
-    from lutgen.tissue import Skin
+    from lutgen.skin.tissue import Skin
 
     if options.measured is None:
         raise InputError(

@@ -6,10 +6,10 @@ import importlib
 import json
 from pathlib import Path
 
-from lutgen import folders
 from lutgen.errors import InputError, one_of
-from lutgen.exports.source import Report, Source, nested_size
-from lutgen.lutset import LutSet
+from lutgen.exports.resampled import Report, Source, nested_size
+from lutgen.files import folders
+from lutgen.tables.lut_set import LutSet
 
 TARGETS = ("cube", "exr", "unreal", "unity", "godot", "three", "openpbr", "preintegrated")
 """Targets by name; the module of that name in this package writes its folder."""

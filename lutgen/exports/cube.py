@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.exports.source import MADE, MEANING, Report, Source, difference, trilinear, warps
+from lutgen.exports.resampled import MADE, MEANING, Report, Source, difference, trilinear, warps
 
 FILE = "skin.cube"
 DECIMALS = 7

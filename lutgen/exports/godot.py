@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr
-from lutgen.exports import shader
-from lutgen.exports.editors import slices
-from lutgen.exports.source import AXES, MADE, MEANING, Preset, Report, Source, difference, trilinear, warps
+from lutgen.exports import lookup
+from lutgen.exports.engine_textures import slices
+from lutgen.exports.resampled import AXES, MADE, MEANING, Preset, Report, Source, difference, trilinear, warps
+from lutgen.files import exr
 
 COLOR, PROFILE, SHADER, SCENE = "skin_color.exr", "skin_profile.exr", "skin.gdshader", "skin.tscn"
 _KEPT = {"compress/mode": 3, "compress/high_quality": "false", "compress/hdr_compression": 0,
@@ -32,7 +32,7 @@ def write(source: Source, folder: Path) -> Report:
     half = source.own_colors("srgb").astype("f2")
     note = {"axes": warps(source.grid), "space": "linear Rec. 709"}
     exr.write(folder / COLOR, [exr.Part("color", exr.rgb(slices(half)), note)], exr.REC709)
-    table = shader.profile_texels(source)
+    table = lookup.profile_texels(source)
     channels = {name: np.ascontiguousarray(table[..., k].astype("f2")) for k, name in enumerate("RGBA")}
     exr.write(folder / PROFILE, [exr.Part("profile", channels, {"axes": warps(source.luts.profile_lut.grid)})])
     presets = source.presets
@@ -54,7 +54,7 @@ def write(source: Source, folder: Path) -> Report:
         "Drop the folder into a project: Godot 4 imports the strips by their .import files. Give a material to a mesh.",
         f"{COLOR}: Texture3D {N_m} x {N_e} x {N_h} as {N_h} tiles; half, linear Rec. 709, unclipped.",
         f"x melanin, y eumelanin, z hemoglobin: u = (t (N - 1) + 0.5) / N; t = {axes}.",
-        f"{PROFILE}: columns: quantiles (k + 0.5) / {shader.QUANTILES}, rows: nodes; R radius in mm, GBA energy within",
+        f"{PROFILE}: columns: quantiles (k + 0.5) / {lookup.QUANTILES}, rows: nodes; R radius in mm, GBA energy within",
         "(lutgen_ring, for your own gather). Maps: a texel t multiplies its slider by 4 t^3; import them lossless.",
         *MEANING,
         f"Error it adds (half floats): color {error['color']['largest']:.2g}, radius in mm or encircled energy "
@@ -78,7 +78,7 @@ def shader_text(source: Source) -> str:
         span = f" : hint_range({axis.low:.9g}, {axis.high:.9g}, 0.0001)" if axis.count > 1 else ""
         sliders.append(f"uniform float {name}{span} = {float(value)};")
     text = files("lutgen.exports").joinpath("templates", SHADER).read_text(encoding="utf-8")
-    functions = shader.text(source, "gdshader").strip()
+    functions = lookup.text(source, "gdshader").strip()
     return text.replace("/*SLIDERS*/", "\n".join(sliders)).replace("/*FUNCTIONS*/", functions)
 
 

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from lutgen.exports.source import ENTRY, MADE, Preset, Report, Source
+from lutgen.exports.resampled import ENTRY, MADE, Preset, Report, Source
 
 FILE = "skin.mtlx"
 N = 1.4

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr
-from lutgen.exports.source import MADE, Preset, Report, Source, difference
+from lutgen.exports.resampled import MADE, Preset, Report, Source, difference
+from lutgen.files import exr
 
 SIZE = (128, 64)
 """Texels along N.L and along curvature."""

@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from lutgen import head, maps, painting
-from lutgen.axes import Axis
 from lutgen.color import encode_srgb
-from lutgen.exports import shader
+from lutgen.exports import lookup
 from lutgen.exports.ktx2 import UNSPECIFIED, ktx2
-from lutgen.exports.source import AXES, ENTRY, MADE, MEANING, Report, Source, difference, trilinear, warps
+from lutgen.exports.resampled import AXES, ENTRY, MADE, MEANING, Report, Source, difference, trilinear, warps
+from lutgen.files import texture_maps
+from lutgen.head import builtin, paint
+from lutgen.tables.axes import Axis
 
 COLOR, PROFILE, CHUNK, PAGE = "skin_color.ktx2", "skin_profile.ktx2", "skin.glsl", "skin.html"
 _PRECISION = "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\nprecision highp sampler3D;\n"
@@ -40,7 +41,7 @@ _JPEG = {"format": "JPEG", "quality": 85, "subsampling": 0}
 def write(source: Source, folder: Path) -> Report:
     """Write both textures, the GLSL and the page into a folder."""
     color = _color(source)
-    table = shader.profile_texels(source)
+    table = lookup.profile_texels(source)
     profile = table.astype("f2")
     notes = {"KTXwriter": f"lutgen {version('lutgen')}", "lutgen.axes": json.dumps(warps(source.grid))}
     written = {
@@ -48,7 +49,7 @@ def write(source: Source, folder: Path) -> Report:
         PROFILE: ktx2(
             profile, notes | {"lutgen.columns": "radius mm, encircled energy R, G, B; row = node"}, UNSPECIFIED
         ),
-        CHUNK: (_PRECISION + shader.text(source, "glsl")).encode(),
+        CHUNK: (_PRECISION + lookup.text(source, "glsl")).encode(),
     }
     for name, content in written.items():
         (folder / name).write_bytes(content)
@@ -65,7 +66,7 @@ def write(source: Source, folder: Path) -> Report:
         "three.js: new KTX2Loader().detectSupport(renderer).loadAsync(...); LinearFilter, clamped.",
         "Color: linear Rec. 709, unclipped; x melanin, y eumelanin, z hemoglobin: u = (t (N - 1) + 0.5) / N,",
         f"t = {axes}.",
-        f"Profile: column k: quantile (k + 0.5) / {shader.QUANTILES}; row: node of {' x '.join(map(str, counts))}; "
+        f"Profile: column k: quantile (k + 0.5) / {lookup.QUANTILES}; row: node of {' x '.join(map(str, counts))}; "
         "radius mm, encircled energy.",
         *MEANING,
         f"Error it adds (half floats): color {error['color']['largest']:.2g}, radius in mm or encircled energy "
@@ -83,8 +84,8 @@ def _color(source: Source) -> np.ndarray:
 def page(source: Source, written: dict[str, bytes]) -> str:
     """The page as HTML, everything inside: shaders, textures as they were written, and the built-in head."""
     template = files("lutgen.exports").joinpath("templates")
-    shape = head.builtin()
-    painted = painting.paint(shape)
+    shape = builtin.builtin()
+    painted = paint.paint(shape)
     arrays, facts = _mesh(shape, painted["surface"][..., 2])
     packed = {COLOR: written[COLOR], PROFILE: written[PROFILE], **arrays}
     data = {
@@ -131,8 +132,10 @@ def _mesh(shape, open_sky: np.ndarray) -> tuple[dict[str, bytes], dict]:
 def _pigments(painted: dict) -> bytes:
     """Ratios of melanin and hemoglobin as maps hold them, and half the ratio of roughness, in one picture."""
     ratios, surface = (painted[name][::2, ::2].astype(float) for name in ("chromophores", "surface"))
-    rough = np.round(np.clip(surface[..., 0] / maps.SURFACE_RANGE, 0, 1) * 255).astype("u1")
-    return _jpeg(np.stack([maps.encode_ratio(ratios[..., 0]), maps.encode_ratio(ratios[..., 2]), rough], axis=-1))
+    rough = np.round(np.clip(surface[..., 0] / texture_maps.SURFACE_RANGE, 0, 1) * 255).astype("u1")
+    return _jpeg(
+        np.stack([texture_maps.encode_ratio(ratios[..., 0]), texture_maps.encode_ratio(ratios[..., 2]), rough], axis=-1)
+    )
 
 
 def _jpeg(picture: np.ndarray) -> bytes:

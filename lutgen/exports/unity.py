@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr
 from lutgen.errors import InputError
-from lutgen.exports import cube, editors, shader
-from lutgen.exports.source import MADE, MEANING, Preset, Report, Source, warps
+from lutgen.exports import cube, engine_textures, lookup
+from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source, warps
+from lutgen.files import exr
 
 COLOR, PROFILE, CUBE = "lutgen_color.exr", "lutgen_profile.exr", "lutgen_color.cube"
 IMPORTER = "Editor/LutgenImporter.cs"
@@ -48,7 +48,7 @@ def diffusion_profile(preset: Preset) -> dict:
         "name": "Lutgen" + "".join(part.capitalize() for part in preset.name.split("-")),
         "color": (preset.burley_d_mm / widest).tolist(),
         "multiplier": widest,
-        "ior": editors.N,
+        "ior": engine_textures.N,
         "filterRadiusMm": FILTER_RADIUS * widest,
     }
 
@@ -60,16 +60,16 @@ def write(source: Source, folder: Path) -> Report:
         raise InputError(f"unity: {len(presets)} presets: HDRP holds {PROFILES} Diffusion Profiles")
     N_h, N_e, N_m = source.grid.shape
     half = source.own_colors("srgb").astype("f2")
-    flipbook = editors.fits("unity", "color", editors.slices(half))
-    texels = editors.fits("unity", "profile", shader.profile_texels(source).astype("f4"))
+    flipbook = engine_textures.fits("unity", "color", engine_textures.slices(half))
+    texels = engine_textures.fits("unity", "profile", lookup.profile_texels(source).astype("f4"))
     notes = {"axes": warps(source.grid), "space": "linear Rec. 709"}
     exr.write(folder / COLOR, [exr.Part("color", exr.rgb(flipbook[::-1]), notes)], exr.REC709)
-    exr.write(folder / PROFILE, [exr.Part("profile", editors.rgba(texels[::-1]), {})], exr.REC709)
+    exr.write(folder / PROFILE, [exr.Part("profile", engine_textures.rgba(texels[::-1]), {})], exr.REC709)
     text, values = cube.text(source, "lutgen skin")
     (folder / CUBE).write_text(text, encoding="ascii")
-    (folder / "lutgen.hlsl").write_text(editors.hlsl(source, _NOTE, _GRAPH), encoding="ascii")
+    (folder / "lutgen.hlsl").write_text(engine_textures.hlsl(source, _NOTE, _GRAPH), encoding="ascii")
     (folder / IMPORTER).parent.mkdir()
-    (folder / IMPORTER).write_text(editors.template("LutgenImporter.cs"), encoding="ascii")
+    (folder / IMPORTER).write_text(engine_textures.template("LutgenImporter.cs"), encoding="ascii")
     described = {
         "columns": N_h,
         "size": [N_m, N_e, N_h],
@@ -84,14 +84,14 @@ def write(source: Source, folder: Path) -> Report:
     for name, settings in metas.items():
         meta = f"fileFormatVersion: 2\nguid: {guid(name)}\n{settings}"
         (folder / f"{name}.meta").write_text(meta, encoding="ascii")
-    error, worst = editors.errors(source, half, texels)
+    error, worst = engine_textures.errors(source, half, texels)
     error["cube"] = cube.error(source, values)
     return Report((
         "Put the folder into Assets (2021.3 or later), then Tools > Lutgen > Import: textures, a Texture3D of the .cube"
         " and, where HDRP is installed, a Diffusion Profile per preset (values: lutgen.json).",
         f"{COLOR}: half, linear Rec. 709, unclipped; a flipbook of {N_h} columns (hemoglobin), {N_m} x {N_e} each: "
         "melanin right, eumelanin up. Its .meta makes it a Texture3D: linear, no mips, clamp, RGBAHalf.",
-        f"{PROFILE}: float, {shader.QUANTILES} x {len(texels)}: row from the bottom = node, melanin fastest; column = "
+        f"{PROFILE}: float, {lookup.QUANTILES} x {len(texels)}: row from the bottom = node, melanin fastest; column = "
         "quantile; R is a radius in mm, G B A the share of red, green, blue light within it.",
         f"{CUBE}: {source.size} nodes an axis, clipped to 0 to 1; R G B = melanin, eumelanin, hemoglobin after the "
         f"warp. lutgen.hlsl is for the textures; its Lutgen*_float for Shader Graph's Custom Function (File).",
@@ -118,7 +118,7 @@ def _texture_meta(shape: int, columns: int, pixels: int, filtering: int) -> str:
     linearTexture: 0
   isReadable: {flag}
   streamingMipmaps: 0
-  maxTextureSize: {editors.LIMIT}
+  maxTextureSize: {engine_textures.LIMIT}
   textureSettings:
     serializedVersion: 2
     filterMode: {filtering}
@@ -137,7 +137,7 @@ def _texture_meta(shape: int, columns: int, pixels: int, filtering: int) -> str:
   platformSettings:
   - serializedVersion: 3
     buildTarget: DefaultTexturePlatform
-    maxTextureSize: {editors.LIMIT}
+    maxTextureSize: {engine_textures.LIMIT}
     resizeAlgorithm: 0
     textureFormat: {pixels}
     textureCompression: 0

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import exr
-from lutgen.exports import editors, shader
-from lutgen.exports.source import MADE, MEANING, Preset, Report, Source, warps
+from lutgen.exports import engine_textures, lookup
+from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source, warps
+from lutgen.files import exr
 
 COLOR, PROFILE = "T_LutgenColor.exr", "T_LutgenProfile.exr"
 LEAST = 0.009
@@ -45,7 +45,7 @@ def subsurface_profile(preset: Preset) -> dict:
         "world_unit_scale": WORLD_UNIT_SCALE,
         "enable_burley": True,
         "enable_mean_free_path": True,
-        "ior": editors.N,
+        "ior": engine_textures.N,
     }
 
 
@@ -61,17 +61,17 @@ def asset_name(preset: str) -> str:
 def write(source: Source, folder: Path) -> Report:
     """Write the strips, the HLSL, the values and the import script into a folder."""
     half = source.own_colors("srgb").astype("f2")
-    strip = editors.fits("unreal", "color", editors.slices(half))
-    texels = editors.fits("unreal", "profile", shader.profile_texels(source).astype("f4"))
+    strip = engine_textures.fits("unreal", "color", engine_textures.slices(half))
+    texels = engine_textures.fits("unreal", "profile", lookup.profile_texels(source).astype("f4"))
     notes = {"axes": warps(source.grid), "space": "linear Rec. 709"}
     exr.write(folder / COLOR, [exr.Part("color", exr.rgb(strip), notes)], exr.REC709)
-    exr.write(folder / PROFILE, [exr.Part("profile", editors.rgba(texels), {})], exr.REC709)
-    (folder / "lutgen.ush").write_text(editors.hlsl(source, _NOTE), encoding="ascii")
-    functions = shader.text(source, "hlsl").strip()
+    exr.write(folder / PROFILE, [exr.Part("profile", engine_textures.rgba(texels), {})], exr.REC709)
+    (folder / "lutgen.ush").write_text(engine_textures.hlsl(source, _NOTE), encoding="ascii")
+    functions = lookup.text(source, "hlsl").strip()
     for name in ("color", "ring"):
-        code = editors.custom_node(functions, f"lutgen_{name}")
+        code = engine_textures.custom_node(functions, f"lutgen_{name}")
         (folder / f"custom_node_{name}.hlsl").write_text(code, encoding="ascii")
-    (folder / "import_lutgen.py").write_text(editors.template("import_lutgen.py.txt"), encoding="ascii")
+    (folder / "import_lutgen.py").write_text(engine_textures.template("import_lutgen.py.txt"), encoding="ascii")
     N_h, N_e, N_m = source.grid.shape
     values = {
         "color": {"file": COLOR, "tile": [N_m, N_e]},
@@ -79,13 +79,13 @@ def write(source: Source, folder: Path) -> Report:
         "subsurface_profiles": {asset_name(p.name): subsurface_profile(p) for p in source.presets},
     }
     (folder / "lutgen.json").write_text(json.dumps(values, indent=1) + "\n", encoding="ascii")
-    error, worst = editors.errors(source, half, texels)
+    error, worst = engine_textures.errors(source, half, texels)
     return Report((
         "import_lutgen.py: run it in the editor (Python Editor Script Plugin, Tools > Execute Python Script; 5.1 or "
         "later): it makes /Game/Lutgen, the textures and a Subsurface Profile per preset (values: lutgen.json).",
         f"{COLOR}: half, linear Rec. 709, unclipped; {N_h} slices of {N_m} x {N_e} along hemoglobin, melanin +x, "
         "eumelanin down; for VT_LutgenColor, a Volume Texture by tile size: no sRGB, no mips, clamp, HDR.",
-        f"{PROFILE}: float, {shader.QUANTILES} x {len(texels)}: row = node, melanin fastest; column = quantile; R "
+        f"{PROFILE}: float, {lookup.QUANTILES} x {len(texels)}: row = node, melanin fastest; column = quantile; R "
         "is a radius in mm, G B A the share of red, green, blue light within it.",
         "custom_node_*.hlsl: code of Custom nodes: inputs lut, skin (float3 out) or profile, quantile, skin (float4);"
         " or lutgen.ush in PROJECT/Shaders, included as /Project/lutgen.ush. Skin: melanin, eumelanin, hemoglobin.",

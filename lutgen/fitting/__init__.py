@@ -18,7 +18,7 @@ from lutgen.errors import InputError, in_range, one_of, shown
 from lutgen.fitting import least_squares, measured, nearest, uncertainty
 from lutgen.fitting.measured import Measured
 from lutgen.fitting.nearest import CUBE_ROOT, PARAMETERS, Problem
-from lutgen.tissue import REFRACTIVE_INDEX, Skin
+from lutgen.skin.tissue import REFRACTIVE_INDEX, Skin
 
 OF_SPECTRUM, OF_COLOR = ("melanin", "hemoglobin", "oxygenation"), ("melanin", "hemoglobin")
 """What is fitted unless said otherwise; a color hardly shows its oxygenation."""

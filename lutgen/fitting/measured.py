@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from lutgen import color
-from lutgen.chromophores import WAVELENGTH_NM
 from lutgen.errors import InputError, numbers, shown
+from lutgen.skin.chromophores import WAVELENGTH_NM
 
 COLUMNS = ("wavelength_nm", "reflectance")
 GRAMMAR = "#rrggbb, srgb:r,g,b (0 to 1, encoded), linear:r,g,b (linear sRGB), lab:L,a,b or xyz:X,Y,Z (Y of white 1)"

@@ -15,11 +15,12 @@ from itertools import product
 
 import numpy as np
 
-from lutgen import chromophores, color
+from lutgen import color
 from lutgen.fitting import least_squares
 from lutgen.fitting.measured import Measured, color_weights
-from lutgen.solvers import totals
-from lutgen.tissue import Skin
+from lutgen.skin import chromophores
+from lutgen.skin.tissue import Skin
+from lutgen.solvers import exact_totals
 
 PARAMETERS = {
     "melanin": chromophores.MELANIN, "hemoglobin": chromophores.HEMOGLOBIN,
@@ -59,7 +60,7 @@ class Problem:
         """The model's reflectance [B, n] at points [B, P]."""
         of = {name: np.full(len(points), getattr(self.base, name)) for name in PARAMETERS} | self.values(points)
         plain = replace(self.base, melanin=0.01, eumelanin=0.7, hemoglobin=0.01, oxygenation=0.7)
-        found = totals.spectra(
+        found = exact_totals.spectra(
             _table(plain), self.wavelength_nm, of["melanin"], of["eumelanin"], of["hemoglobin"], of["oxygenation"]
         )
         return found + self.offset
@@ -123,5 +124,5 @@ def _power(name: str) -> int:
 
 
 @lru_cache(maxsize=4)
-def _table(plain: Skin) -> totals.ExactTotals:
-    return totals.exact_totals(plain)
+def _table(plain: Skin) -> exact_totals.ExactTotals:
+    return exact_totals.exact_totals(plain)

@@ -8,7 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from lutgen.config import Recipe
+from lutgen.tables.recipe import Recipe
 
 PATH_NODES = 16 * 16
 """Absorption nodes of a stored path table, per wavelength and ring."""
@@ -35,7 +35,7 @@ class Tier:
 @cache
 def _file() -> tuple[dict[str, tuple[float, float]], dict[str, float], tuple[Tier, ...], str]:
     """Trace (fixed, per photon) by rule, the rest's coefficients, tiers from cheap to dear, and the header."""
-    lines = (files("lutgen.data") / "plan.csv").read_text(encoding="utf-8").splitlines()
+    lines = (files("lutgen.planning") / "plan.csv").read_text(encoding="utf-8").splitlines()
     trace, rest, found = {}, {}, {}
     for line in lines:
         if line.startswith("#"):

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen import chromophores, maps
-from lutgen.axes import ALLOWED
 from lutgen.errors import InputError, in_range, one_of, shown, whole
-from lutgen.tissue import PRESETS
+from lutgen.files import texture_maps
+from lutgen.skin import chromophores
+from lutgen.skin.tissue import PRESETS
+from lutgen.tables.axes import ALLOWED
 
 Range = tuple[float, float]
 
@@ -180,15 +181,17 @@ def _varied(vary: str | None) -> tuple[str, ...]:
 def _map_ratios(path: Path) -> dict[str, Range]:
     """Least and greatest ratio of each chromophore in a map or a folder of maps."""
     if path.is_dir():
-        files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in maps.SUFFIXES]
-        found = {file.stem: file for file in files if file.stem in maps.RATIOS}
+        files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in texture_maps.SUFFIXES]
+        found = {file.stem: file for file in files if file.stem in texture_maps.RATIOS}
     else:
-        found = {path.stem: path} if path.stem in maps.RATIOS else {}
+        found = {path.stem: path} if path.stem in texture_maps.RATIOS else {}
     if not found:
-        raise InputError(f"tones = {path}: no map of {', '.join(maps.RATIOS)} there (as {', '.join(maps.SUFFIXES)})")
+        raise InputError(
+            f"tones = {path}: no map of {', '.join(texture_maps.RATIOS)} there (as {', '.join(texture_maps.SUFFIXES)})"
+        )
     ratios = {}
     for name, file in found.items():
-        values = maps.ratio(file)
+        values = texture_maps.ratio(file)
         if values.size == 0 or values.min() < 0:
             raise InputError(f"map {file}: holds no ratios of 0 or more; mend it")
         ratios[name] = float(values.min()), float(values.max())

@@ -12,12 +12,15 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from lutgen import chromophores, color, expansion, profiles, quadrature
-from lutgen.axes import Grid
-from lutgen.planning import pilot
+from lutgen import color
+from lutgen.planning import stored_paths
 from lutgen.planning.needs import Needs, panel
-from lutgen.solvers import totals
-from lutgen.tissue import REFRACTIVE_INDEX, Skin
+from lutgen.skin import chromophores
+from lutgen.skin.tissue import REFRACTIVE_INDEX, Skin
+from lutgen.solvers import exact_totals as totals
+from lutgen.solvers import profiles
+from lutgen.tables import expand, wavelengths
+from lutgen.tables.axes import Grid
 
 PERCENTILE = 95
 BAKES = 8
@@ -61,7 +64,7 @@ class Colors:
 
     def quadrature(self, rule: str) -> float:
         """Error of a rule's wavelengths alone."""
-        chosen = quadrature.load(rule)
+        chosen = wavelengths.load(rule)
         found = [
             totals.spectra(self.exact, chosen.wavelength_nm, *self.skins, oxygenation) @ chosen.xyz_weights
             for oxygenation in self.needs.oxygenations
@@ -75,7 +78,7 @@ class Colors:
 
     def interpolation(self, rule: str, grid: Grid) -> float:
         """Error of interpolation alone: against the same wavelengths at the skins themselves."""
-        chosen = quadrature.load(rule)
+        chosen = wavelengths.load(rule)
         truth = [
             color.lab(totals.spectra(self.exact, chosen.wavelength_nm, *self.skins, oxygenation) @ chosen.xyz_weights)
             for oxygenation in self.needs.oxygenations
@@ -84,12 +87,12 @@ class Colors:
 
     def noise(self, rule: str, photons: int) -> float:
         """What totals that are not anchored would err by, by a draw of the noise of each skin and wavelength."""
-        chosen, rng = quadrature.load(rule), np.random.default_rng(SEED)
+        chosen, rng = wavelengths.load(rule), np.random.default_rng(SEED)
         nm, found, right = chosen.wavelength_nm, [], []
         nu = np.minimum(chromophores.epidermis_range(nm)[0], chromophores.dermis_range(nm)[0])[:, None]
         entry = 1 - ((REFRACTIVE_INDEX - 1) / (REFRACTIVE_INDEX + 1)) ** 2
         for oxygenation in self.needs.oxygenations:
-            mu = expansion.coefficients(nm, expansion.absorbers(nm, oxygenation), *self.skins)
+            mu = expand.coefficients(nm, expand.absorbers(nm, oxygenation), *self.skins)
             R, doubled = self.exact(nm, *mu), self.exact(nm, *(2 * v - nu for v in mu))
             sigma = np.sqrt(np.maximum(entry * doubled - R**2, 0) / photons)
             found.append((R + sigma * rng.standard_normal(R.shape)).T @ chosen.xyz_weights)
@@ -98,7 +101,7 @@ class Colors:
 
     def cells(self, rule: str, grid: Grid) -> list[np.ndarray]:
         """Exact XYZ [N_h, N_e, N_m, 3] of every node, per oxygenation."""
-        chosen = quadrature.load(rule)
+        chosen = wavelengths.load(rule)
         nm = chosen.wavelength_nm[:, None]
         m, e = np.meshgrid(grid.melanin.values, grid.eumelanin.values)
         mu_e = chromophores.epidermis(nm, m.ravel(), e.ravel())
@@ -150,18 +153,18 @@ class Profiles:
     @cached_property
     def radius_mm(self) -> np.ndarray:
         """Where encircled energy is compared, mm."""
-        far = pilot.edges()
+        far = stored_paths.edges()
         return np.concatenate([[self.needs.from_mm], far[far > self.needs.from_mm]])
 
     @cached_property
     def truth(self) -> np.ndarray:
         """Encircled energy [O, P, 3, R] of the skins, every 5 nm, per oxygenation."""
-        return self._seen(self._own(pilot.TRUTH)[0])
+        return self._seen(self._own(stored_paths.TRUTH)[0])
 
     def reach_mm(self) -> float:
         """Radius within which 99 % of the widest channel's light leaves, of the skin where it is widest."""
-        P = self._own(pilot.TRUTH)[0]
-        return float(profiles.inverse(P.reshape(-1, P.shape[-1]), pilot.edges(), np.array([0.99])).max())
+        P = self._own(stored_paths.TRUTH)[0]
+        return float(profiles.inverse(P.reshape(-1, P.shape[-1]), stored_paths.edges(), np.array([0.99])).max())
 
     def unscattered(self) -> float:
         """Error of no profile at all: the share that leaves outside a pixel's own disc."""
@@ -178,7 +181,7 @@ class Profiles:
 
     def rings(self, count: int) -> float:
         """Error of that many rings alone."""
-        return largest(self._seen(self._own(pilot.TRUTH)[0], count) - self.truth)
+        return largest(self._seen(self._own(stored_paths.TRUTH)[0], count) - self.truth)
 
     def interpolation(self, rule: str, grid: Grid) -> float:
         """Error of nodes alone, against the same wavelengths at the skins themselves."""
@@ -198,18 +201,22 @@ class Profiles:
         """Encircled energy at the radii, as the stored paths or a LUT of that many rings tell it."""
         if ("seen", rings) not in self._cache:
             radii = self.radius_mm
-            matrix = pilot.within(pilot.edges(), radii) if rings is None else pilot.in_rings(radii, rings)
+            matrix = (
+                stored_paths.within(stored_paths.edges(), radii)
+                if rings is None
+                else stored_paths.in_rings(radii, rings)
+            )
             self._cache["seen", rings] = matrix.T
         return P @ self._cache["seen", rings]
 
     def _own(self, rule: str) -> tuple[np.ndarray, np.ndarray]:
         """Encircled energy [O, P, 3, B + 1] at the skins themselves, and total ACEScg [O, P, 3]."""
         if ("own", rule) not in self._cache:
-            table, weights = pilot.stored(rule)
+            table, weights = stored_paths.stored(rule)
             found = []
             for oxygenation in self.needs.oxygenations:
-                absorb = expansion.absorbers(table.wavelength_nm, oxygenation)
-                mu = expansion.coefficients(table.wavelength_nm, absorb, *self.skins)
+                absorb = expand.absorbers(table.wavelength_nm, oxygenation)
+                mu = expand.coefficients(table.wavelength_nm, absorb, *self.skins)
                 found.append(np.einsum("kbp,kc->pcb", table.evaluate(*mu), weights, optimize=True))
             energy = np.maximum(found, 0)
             self._cache["own", rule] = profiles.encircled(energy), energy.sum(axis=-1)
@@ -218,11 +225,11 @@ class Profiles:
     def _between(self, rule: str, grid: Grid) -> np.ndarray:
         """Encircled energy [O, P, 3, B + 1] interpolated between a grid's nodes."""
         if ("between", rule, grid) not in self._cache:
-            table, weights = pilot.stored(rule)
+            table, weights = stored_paths.stored(rule)
             found = []
             for oxygenation in self.needs.oxygenations:
-                absorb = expansion.absorbers(table.wavelength_nm, oxygenation)
-                shape, _ = expansion.profile_cells(table, grid, absorb, weights)
+                absorb = expand.absorbers(table.wavelength_nm, oxygenation)
+                shape, _ = expand.profile_cells(table, grid, absorb, weights)
                 found.append(grid.interpolate(shape, *self.skins).swapaxes(1, 2))
             self._cache["between", rule, grid] = profiles.encircled(np.array(found))
         return self._cache["between", rule, grid]
@@ -230,21 +237,25 @@ class Profiles:
     def _unit_noise(self, rule: str) -> np.ndarray:
         """Noise [draws, O, P, 3, R] of encircled energy with one photon per wavelength."""
         if ("noise", rule) not in self._cache:
-            table, weights = pilot.stored(rule)
+            table, weights = stored_paths.stored(rule)
             nm, totals_ = table.wavelength_nm, self._own(rule)[1]
             nu = np.minimum(chromophores.epidermis_range(nm)[0], chromophores.dermis_range(nm)[0])
             mu = [
-                expansion.coefficients(nm, expansion.absorbers(nm, oxygenation), *self.skins)
+                expand.coefficients(nm, expand.absorbers(nm, oxygenation), *self.skins)
                 for oxygenation in self.needs.oxygenations
             ]
             spans = [_widened(np.concatenate([pair[layer] for pair in mu], axis=1)) for layer in (0, 1)]
-            drawn, roots = pilot.noise(table, nu, (spans[0], spans[1]), DRAWS, SEED)
-            at_radii = np.einsum("rb,skbij->srkij", pilot.within(pilot.edges(), self.radius_mm)[:, 1:], drawn)
+            drawn, roots = stored_paths.noise(table, nu, (spans[0], spans[1]), DRAWS, SEED)
+            at_radii = np.einsum(
+                "rb,skbij->srkij", stored_paths.within(stored_paths.edges(), self.radius_mm)[:, 1:], drawn
+            )
             S, R = at_radii.shape[:2]
             flat = at_radii.reshape(S * R, -1).astype("f4")
             found = np.empty((S, len(mu), len(self.skins[0]), 3, R), "f4")
             for o, pair in enumerate(mu):
-                to_e, to_d = (pilot.interpolation_matrix(root, np.cbrt(v)) for root, v in zip(roots, pair, strict=True))
+                to_e, to_d = (
+                    stored_paths.interpolation_matrix(root, np.cbrt(v)) for root, v in zip(roots, pair, strict=True)
+                )
                 weight = np.einsum("kpi,kpj,kc,pc->kijpc", to_e, to_d, weights, 1 / totals_[o], optimize=True)
                 values = flat @ weight.reshape(flat.shape[1], -1).astype("f4")
                 found[:, o] = values.reshape(S, R, -1, 3).transpose(0, 2, 3, 1)

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from lutgen import quadrature
-from lutgen.axes import Grid
-from lutgen.config import RINGS, Recipe
 from lutgen.planning import prediction
-from lutgen.planning.judging import AXES, LEEWAY, PHOTONS, SPACINGS, Judge, axis_of, middles, resized
+from lutgen.planning.judge import AXES, LEEWAY, PHOTONS, SPACINGS, Judge, axis_of, middles, resized
 from lutgen.planning.needs import Needs
+from lutgen.tables import wavelengths
+from lutgen.tables.axes import Grid
+from lutgen.tables.recipe import RINGS, Recipe
 
 COLOR_MARGIN = 0.97
 """Share of the tolerance that predicted colors may take: another 1,500 skins differ by so much in their percentile."""
@@ -27,7 +27,7 @@ MOST_NODES = 64
 def candidates(judged: Judge) -> Iterator[Recipe]:
     """Recipes that hold: per rule the least color table, and profile tables from coarse with many photons to fine."""
     needs, found, fewer = judged.needs, 0, ""
-    for rule in quadrature.NAMES:
+    for rule in wavelengths.NAMES:
         if found and (rule.endswith("nm") or _negligible(judged, fewer)):
             return  # regular rules cost a multiple of the fitted ones
         fewer = rule

@@ -1,4 +1,7 @@
-"""Depth under a closed mesh on a grid that is fine near its surface (kernels/distance.cl, read by kernels/depth.cl)."""
+"""Depth under a closed mesh on a grid that is fine near its surface.
+
+kernels/render/distance.cl makes it, depth.cl beside it reads it.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lutgen import cache
 from lutgen import device as ocl
 from lutgen.errors import InputError
-from lutgen.render import bvh, closed
+from lutgen.files import cache
+from lutgen.head import mend
+from lutgen.render import bvh
 
 CELLS = 8
 """Cells of a brick along each side."""
@@ -56,12 +60,12 @@ def of_mesh(
     spacing_mm: float | None = None,
 ) -> Depths:  # fmt: skip
     """Depths under a mesh, from the cache where they are there; InputError for one that cannot be closed."""
-    positions, corners, notes = closed.surface(positions_mm, triangles)
+    positions, corners, notes = mend.surface(positions_mm, triangles)
     low, high = positions.min(axis=0), positions.max(axis=0)
     cell = spacing(high - low) if spacing_mm is None else spacing_mm
     band = (-2 * cell, epidermis_mm + _BELOW_MM)
     size = np.array([cell, *band])
-    code = np.frombuffer(ocl.source("trace", "depth", "distance").encode(), "u1")
+    code = np.frombuffer(ocl.source("render/trace", "render/depth", "render/distance").encode(), "u1")
     key = size, positions, corners, code
     made = cache.kept(
         "depth", ("render/distance", "render/bvh"), lambda: _make(positions, corners, cell, band, device), *key
@@ -81,8 +85,8 @@ def tree_buffers(device: ocl.Device, positions: np.ndarray, triangles: np.ndarra
 
 
 def kernel(device: ocl.Device, entry: str):
-    """A built kernel of kernels/distance.cl."""
-    text = ocl.struct_source(device, (STRUCT,)) + ocl.source("trace", "depth", "distance")
+    """A built kernel of kernels/render/distance.cl."""
+    text = ocl.struct_source(device, (STRUCT,)) + ocl.source("render/trace", "render/depth", "render/distance")
     return ocl.kernel(device, entry, text, {"WIDTH": _width(device)})
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.errors import InputError, in_range, whole
-from lutgen.render import picture, walks
-from lutgen.render.picture import Picture
-from lutgen.render.stage import TALLIES, Stage, items
+from lutgen.render import film, flat_walk
+from lutgen.render.device_scene import TALLIES, Stage, items
+from lutgen.render.film import Picture
 
 SAMPLES, SECONDS, NOISE = (1, 10**7), (0.1, 1e6), (0.01, 100.0)
 DEFAULT_SAMPLES = 256
@@ -78,7 +78,7 @@ class Tally:
 
 
 def render(
-    stage: Stage, walk: walks.Walk, start: Picture, goal: Goal, save: Callable[[Picture, float], None],
+    stage: Stage, walk: flat_walk.Walk, start: Picture, goal: Goal, save: Callable[[Picture, float], None],
     stopped: Callable[[], bool] = lambda: False, progress: Callable = lambda stage, tally: None, exposure: float = 0.0,
 ) -> tuple[Picture, Tally, float]:  # fmt: skip
     """Add samples to a picture until the goal or a stop; returns it, what was done, and its noise in ΔE00.
@@ -89,16 +89,16 @@ def render(
     pixels, device, group = columns * rows, stage.device, walk.group
     tally, begun, rate, cost = Tally(), time.perf_counter(), 2e4, 0.0
     saved = checked = begun
-    held_buffer = ocl.buffer(device, np.zeros((pixels, picture.MOMENTS), "f4"))
+    held_buffer = ocl.buffer(device, np.zeros((pixels, film.MOMENTS), "f4"))
     tallies = np.zeros((items(stage, pixels), len(TALLIES)), "u4")
     tally_buffer = ocl.buffer(device, tallies)
-    made, held, noise = start, 0, picture.noise_delta_e(start, exposure)
+    made, held, noise = start, 0, film.noise_delta_e(start, exposure)
     earlier = start.facts.get("counts", {})
     limit = None if goal.samples is None else -(-goal.samples // group) * group
 
     def gathered() -> Picture:
         """The picture with what the device holds, and what was counted for it in all runs."""
-        moments = ocl.read(device, held_buffer, np.zeros((pixels, picture.MOMENTS), "f4"))
+        moments = ocl.read(device, held_buffer, np.zeros((pixels, film.MOMENTS), "f4"))
         sums = made.sums + moments.reshape(made.sums.shape)
         counts = {name: earlier.get(name, 0) + count for name, count in tally.counts.items()} or earlier
         return replace(made, sums=sums, estimates=made.estimates + held, facts=made.facts | {"counts": counts})
@@ -131,12 +131,12 @@ def render(
         progress("render", tally)
         if (made.estimates + held) % _HELD == 0:
             made, held = gathered(), 0
-            ocl.clear(device, held_buffer, 4 * pixels * picture.MOMENTS)
+            ocl.clear(device, held_buffer, 4 * pixels * film.MOMENTS)
         since = time.perf_counter()
         due = since - saved > max(SAVE_SECONDS, 10 * cost)
         if due or (goal.noise is not None and since - checked > CHECK_SECONDS):
             now = gathered()
-            noise = picture.noise_delta_e(now, exposure)
+            noise = film.noise_delta_e(now, exposure)
             if due:
                 save(now, noise)
             checked = time.perf_counter()
@@ -144,7 +144,7 @@ def render(
             tally.add("write", checked - since)
     since = time.perf_counter()
     made = gathered()
-    noise = picture.noise_delta_e(made, exposure)
+    noise = film.noise_delta_e(made, exposure)
     save(made, noise)
     tally.add("write", time.perf_counter() - since)
     return made, tally, noise

@@ -8,9 +8,9 @@ from importlib import import_module
 import numpy as np
 
 from lutgen.errors import InputError, numbers, one_of, shown, whole
-from lutgen.paths import PHOTONS, SEEDS
-from lutgen.profiles import Profile, default_edges
-from lutgen.tissue import Layer, Skin, layers
+from lutgen.skin.tissue import Layer, Skin, layers
+from lutgen.solvers.paths import PHOTONS, SEEDS
+from lutgen.solvers.profiles import Profile, default_edges
 
 METHODS = {
     "path-table": "path_table",

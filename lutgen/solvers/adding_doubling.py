@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from lutgen.errors import InputError, whole
+from lutgen.skin.tissue import Layer
 from lutgen.solvers.result import Reflectance
-from lutgen.tissue import Layer
 
 NODES = 16
 """Quadrature nodes in each interval between critical cosines: within 1e-6 of 32 nodes on skin (12: 1e-6, 8: 1e-4)."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lutgen.errors import InputError
-from lutgen.profiles import Profile
+from lutgen.skin.tissue import Layer
+from lutgen.solvers.profiles import Profile
 from lutgen.solvers.result import Reflectance
-from lutgen.tissue import Layer
 
 OPTIONS = ("unsafe", "wavelength_nm")
 

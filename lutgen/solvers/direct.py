@@ -1,4 +1,6 @@
-"""Monte Carlo through any stack of layers: the source document's walk, weights and roulette (kernels/direct.cl).
+"""Monte Carlo through any stack of layers: the source document's walk, weights and roulette.
+
+Its kernel is kernels/solvers/direct.cl.
 
 The independent check of path tables, and what the document's section 3 compares: absorption by `albedo` (unbiased),
 `continuous` (unbiased) or `mixed` (the document's exponential with steps from mu_t, which equals the exact solution
@@ -15,11 +17,11 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.errors import InputError, MachineError, in_range, one_of, whole
-from lutgen.paths import PHOTONS, SEEDS
-from lutgen.profiles import Profile
+from lutgen.skin.tissue import Layer
 from lutgen.solvers.path_table import RESULT
+from lutgen.solvers.paths import PHOTONS, SEEDS
+from lutgen.solvers.profiles import Profile
 from lutgen.solvers.result import Reflectance
-from lutgen.tissue import Layer
 
 ABSORPTION = ("albedo", "continuous", "mixed")
 THRESHOLD, SURVIVORS = 1e-4, 10.0
@@ -94,7 +96,9 @@ def records(
 
 
 def _kernel(device: ocl.Device, layers: int, absorption: int):
-    text = ocl.struct_source(device, _STRUCTS) + ocl.source("lanes", "rng", "optics", "direct")
+    text = ocl.struct_source(device, _STRUCTS) + ocl.source(
+        "common/lanes", "common/rng", "common/optics", "solvers/direct"
+    )
     sizes = {"W": device.lanes, "BLOCK_PHOTONS": BLOCK_PHOTONS, "LAYERS": layers, "ABSORPTION": absorption}
     return ocl.kernel(device, "direct", text, sizes)
 
@@ -138,7 +142,7 @@ def _check(layers: list[Layer]) -> None:
 def shares(layers: list[Layer], photons: int = 100_000, seed: int = 0, **options) -> Shares:
     """Where the light goes: diffuse, specular, transmitted, absorbed per layer; options as of `records`.
 
-    >>> from lutgen.tissue import Layer
+    >>> from lutgen.skin.tissue import Layer
     >>> found = shares([Layer(2.0, 1.0, 0.0, 0.0, 1.0)], photons=2048)
     >>> abs(found.transmitted - 0.1353) < 4 * found.transmitted_error  # colored glass without scattering: exp(-2)
     True

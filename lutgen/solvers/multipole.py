@@ -12,11 +12,11 @@ from __future__ import annotations
 import numpy as np
 
 from lutgen.errors import InputError
-from lutgen.profiles import Profile
+from lutgen.skin.tissue import Layer
 from lutgen.solvers import dipole
 from lutgen.solvers.dipole import Diffusion
+from lutgen.solvers.profiles import Profile
 from lutgen.solvers.result import Reflectance
-from lutgen.tissue import Layer
 
 OPTIONS = ("unsafe", "wavelength_nm")
 

@@ -1,7 +1,7 @@
 """Monte Carlo by absorption-free paths: one trace per wavelength serves every absorption (white Monte Carlo).
 
-The kernels are kernels/path_table.cl (the walk into a bank of exit records) and kernels/tabulate.cl (the bank into
-a Laplace table). Photons come in blocks of fixed size, each with its own random streams, so that any split into
+The kernels are kernels/solvers/path_table.cl (the walk into a bank of exit records) and tabulate.cl beside it (the
+bank into a Laplace table). Photons come in blocks of fixed size, each with its own random streams, so that any split into
 launches, in any order, gives the same records and the same fixed-point sums.
 """
 
@@ -15,10 +15,10 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.errors import InputError, MachineError, in_range, whole
-from lutgen.paths import PHOTONS, SEEDS, PathTable, chebyshev
-from lutgen.profiles import Profile
+from lutgen.skin.tissue import Layer
+from lutgen.solvers.paths import PHOTONS, SEEDS, PathTable, chebyshev
+from lutgen.solvers.profiles import Profile
 from lutgen.solvers.result import Reflectance
-from lutgen.tissue import Layer
 
 OPTIONS = ("device", "wavelength_nm")
 BLOCK_PHOTONS = {"cpu": 2048, "gpu": 128}
@@ -36,6 +36,8 @@ JOB = np.dtype(
 )
 RESULT = np.dtype([("escaped", "u4"), ("unfinished", "u4"), ("events", "u8")])
 STRUCTS = (("job_t", JOB), ("result_t", RESULT))
+WALK = "common/lanes", "common/rng", "common/optics", "common/step"
+"""Kernel files that every lock-step walk builds on."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,8 @@ def block_photons(device: ocl.Device) -> int:
 
 
 def walk_kernel(device: ocl.Device, life: str = "", record: int = 3):
-    """The built kernel of kernels/path_table.cl; `life` replaces its LIFE, `record` 4 adds azimuths."""
-    text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "step", "path_table")
+    """The built kernel of kernels/solvers/path_table.cl; `life` replaces its LIFE, `record` 4 adds azimuths."""
+    text = ocl.struct_source(device, STRUCTS) + ocl.source(*WALK, "solvers/path_table")
     text = f"#define LIFE {life}\n{text}" if life else text
     return ocl.kernel(
         device, "walk", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device), "RECORD": record}
@@ -79,15 +81,15 @@ def walk_kernel(device: ocl.Device, life: str = "", record: int = 3):
 
 
 def tabulate_kernel(device: ocl.Device, rings: int, slices: int, nodes: tuple[int, int] = (NODES_E, NODES_D)):
-    """The built kernel of kernels/tabulate.cl."""
-    text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "tabulate")
+    """The built kernel of kernels/solvers/tabulate.cl."""
+    text = ocl.struct_source(device, STRUCTS) + ocl.source("common/lanes", "solvers/tabulate")
     sizes = {"NODES_E": nodes[0], "NODES_D": nodes[1], "RINGS": rings, "SLICES": slices}
     return ocl.kernel(device, "tabulate", text, {"W": device.lanes, "BLOCK_PHOTONS": block_photons(device), **sizes})
 
 
 def kernel_hash(device: ocl.Device) -> str:
     """Short hash of everything the trace's numbers depend on: kernel text, structs, lanes and block size."""
-    text = ocl.struct_source(device, STRUCTS) + ocl.source("lanes", "rng", "optics", "step", "path_table", "tabulate")
+    text = ocl.struct_source(device, STRUCTS) + ocl.source(*WALK, "solvers/path_table", "solvers/tabulate")
     return hashlib.sha256(f"{device.lanes} {block_photons(device)} {NODES_E} {NODES_D} {text}".encode()).hexdigest()[
         :16
     ]

@@ -1,0 +1,1 @@
+"""Speed against accuracy of every method and setting."""

@@ -1,0 +1,1 @@
+"""The source document's results, and what they are compared with."""

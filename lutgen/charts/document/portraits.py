@@ -1,0 +1,117 @@
+"""The source document's three skin types as rendered heads, by samples, without and with textures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import lutgen
+from lutgen import device as ocl
+from lutgen.charts import drawing
+from lutgen.charts.document import comparisons
+from lutgen.charts.drawing import GRAY, HUES, inches
+from lutgen.errors import MachineError
+from lutgen.render import device_scene, film, flat_walk, progressive
+from lutgen.scene import display, subject
+from lutgen.scene import look as looks
+from lutgen.scene.look import Look
+
+SAMPLES = (20, 55, 150)
+"""Samples a pixel of the document's pictures; each goes on from the one before."""
+MEASURED = {"Caucasian": "light", "Asian": "intermediate", "African": "dark"}
+"""A preset fitted to measured skin for each of the document's names: of light, medium and dark skin, no more."""
+SIZE = 176, 216
+BARE, TEXTURED = "without textures", "with textures"
+_LEFT, _TOP, _GAP, _FOOT = 1.25, 1.55, 0.06, 0.28
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """One rendered head: display sRGB [rows, columns, 3] in bytes, and the ΔE00 of a pixel's noise."""
+
+    skin: str
+    preset: str
+    textures: str
+    samples: int
+    noise_delta_e00: float
+    pixels: np.ndarray
+
+
+def portraits(folder: Path, size: tuple[int, int] = SIZE, progress: Callable = lambda stage, tally: None) -> str:
+    """The figure `portraits`; its main figures in words, or why it was left out: it needs OpenCL."""
+    try:
+        device = ocl.choose()
+    except MachineError as error:
+        return f"left out: {error}"
+    found = list(_all(device, size, progress))
+    draw(folder, found, size)
+    last = [one for one in found if one.samples == SAMPLES[-1] and one.textures == TEXTURED]
+    noise = ", ".join(f"{one.preset} {one.noise_delta_e00:.1f}" for one in last)
+    return f"ΔE00 of a pixel's noise at {SAMPLES[-1]} samples: {noise}"
+
+
+def _all(device: ocl.Device, size: tuple[int, int], progress: Callable) -> Iterator[Portrait]:
+    luts = lutgen.load()
+    models = {kind: subject.model(None, None, maps) for kind, maps in ((BARE, subject.NO_MAPS), (TEXTURED, None))}
+    for skin in comparisons.TYPES:
+        for preset, kind in ((f"source-{skin.lower()}", BARE), (f"source-{skin.lower()}", TEXTURED),
+                             (MEASURED[skin], TEXTURED)):  # fmt: skip
+            progress(f"portrait: {preset}, {kind}", None)
+            look = looks.of_preset(preset, Look() if kind == TEXTURED else Look(bumps=0.0))
+            opened = device_scene.open_stage(device, luts, *models[kind], look, size)
+            levels = SAMPLES if preset != MEASURED[skin] else SAMPLES[-1:]
+            for made, noise in at_samples(opened, levels):
+                pixels = display.picture(made.rgb, made.mask, look.exposure)
+                yield Portrait(skin, preset, kind, made.samples, noise, pixels)
+
+
+def at_samples(
+    opened: device_scene.Stage, levels: tuple[int, ...], seed: int = 0
+) -> Iterator[tuple[film.Picture, float]]:
+    """One picture by the flat walk as it is at each number of samples, and its noise in ΔE00."""
+    walk = flat_walk.flat(opened, seed)
+    made = film.empty(opened.size, walk.group, {})
+    for samples in levels:
+        made, _, noise = progressive.render(opened, walk, made, progressive.Goal(samples), lambda one, noise: None)
+        yield made, noise
+
+
+def draw(folder: Path, found: list[Portrait], size: tuple[int, int]) -> None:
+    """Write the figure `portraits`: a row for each skin, a column for each number of samples."""
+    wide, high = SIZE[0] / drawing.DPI, SIZE[1] / drawing.DPI
+    columns = [(preset, kind, samples) for preset, kind in (("document", BARE), ("document", TEXTURED))
+               for samples in SAMPLES] + [("measured", TEXTURED, SAMPLES[-1])]  # fmt: skip
+    width = _LEFT + len(columns) * (wide + _GAP) + 2 * 0.2 + 0.15
+    height = _TOP + len(comparisons.TYPES) * (high + _GAP + _FOOT) + 0.1
+    with drawing.figure(
+        width, height, "The document's three skin types on a head, by samples",
+        "`lutgen render`, flat walk, the same head and light for all; under each picture the ΔE00 of a pixel's noise. "
+        "At the right, presets\nfitted to measured light, intermediate and dark skin (ITA classes), the same textures.",
+    ) as drawn:  # fmt: skip
+        for i, skin in enumerate(comparisons.TYPES):
+            top = _TOP + i * (high + _GAP + _FOOT)
+            drawn.text(0.18 / width, 1 - (top + high / 2) / height, skin, size=11, va="center")
+            for j, (whose, kind, samples) in enumerate(columns):
+                left = _LEFT + j * (wide + _GAP) + 0.2 * (j >= 3) + 0.2 * (j >= 6)
+                (one,) = (p for p in found if (p.skin, p.textures, p.samples) == (skin, kind, samples)
+                          and (p.preset == MEASURED[skin]) == (whose == "measured"))  # fmt: skip
+                axes = inches(drawn, left, top, wide, high)
+                axes.imshow(one.pixels, interpolation="none" if size == SIZE else "nearest", aspect="auto")
+                axes.set_axis_off()
+                words = f"noise {one.noise_delta_e00:.1f}" + (f"   {one.preset}" if whose == "measured" else "")
+                drawn.text(left / width, 1 - (top + high + 0.17) / height, words, color=GRAY, size=8.5)
+                if i:
+                    continue
+                drawn.text(left / width, 1 - (_TOP - 0.07) / height, f"{samples} samples", color=GRAY, va="bottom")
+                if j in (0, 3, 6):
+                    title = "measured skin" if whose == "measured" else f"the document's, {kind}"
+                    drawn.text(left / width, 1 - (_TOP - 0.27) / height, title, color=HUES[j // 3], va="bottom")
+        rows = [
+            {"skin": one.skin, "preset": one.preset, "textures": one.textures, "samples": one.samples,
+             "noise_delta_e00": one.noise_delta_e00, "brightness": float(one.pixels.mean() / 255)}
+            for one in found
+        ]  # fmt: skip
+        drawing.save(drawn, folder, "portraits", rows)

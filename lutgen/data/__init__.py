@@ -1,1 +1,0 @@
-"""Spectra and tables as CSV, the source in each header line, and the scripts that make them."""

@@ -1,0 +1,170 @@
+"""What every export starts from: a LUT set resampled to a cube, points to measure errors at, presets in millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from lutgen import color
+from lutgen.errors import whole
+from lutgen.skin.tissue import PRESETS
+from lutgen.solvers import burley
+from lutgen.tables import expand
+from lutgen.tables.axes import Axis, Grid
+from lutgen.tables.lut_set import LutSet
+
+SIZES = (2, 256)
+AXES = ("melanin", "eumelanin", "hemoglobin")
+POINTS = 1000
+ENTRY = 1 - ((1.4 - 1) / (1.4 + 1)) ** 2
+"""Share of light along the normal that enters skin of index 1.4; every color contains it."""
+MEANING = (
+    "A value is the share of light along the normal that leaves diffusely, entry transmission included, gloss not:",
+    "so multiply irradiance by T(theta)/T(0) with your own Fresnel, never by 1 - F a second time.",
+)
+"""What a color means, in two lines of every README."""
+MADE = "manifest.json says how the set was made and how far it is from an exact solver."
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an export says of itself: ten lines for its README, and the error that it adds (plain values)."""
+
+    readme: tuple[str, ...]
+    error: dict
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A preset that the LUTs cover, in linear Rec. 709 as engines calculate: its skin, its color [3], its profile as
+    normalized rings [B, 3] with edges [B + 1] in mm, the share of each channel that was negative and set to 0 [3], and
+    the d in mm of the Burley shape closest to it [3] with the EE difference of that fit [3]."""
+
+    name: str
+    skin: tuple[float, float, float]
+    linear_srgb: np.ndarray
+    rings: np.ndarray
+    edges_mm: np.ndarray
+    clamped_share: np.ndarray
+    burley_d_mm: np.ndarray
+    burley_difference: np.ndarray
+
+
+@dataclass(frozen=True)
+class Source:
+    """A LUT set, and how many nodes along each axis an export that must be cubic has."""
+
+    luts: LutSet
+    size: int
+
+    def __post_init__(self):
+        object.__setattr__(self, "size", whole("size", self.size, *SIZES))
+
+    @property
+    def grid(self) -> Grid:
+        """The set's own grid of colors."""
+        return self.luts.color_lut.grid
+
+    @cached_property
+    def cubic(self) -> Grid:
+        """The same ranges and warps with `size` nodes along each axis that varies."""
+        axes = {name: getattr(self.grid, name) for name in AXES}
+        return Grid(**{n: a if a.count == 1 else replace(a, count=self.size) for n, a in axes.items()})
+
+    def colors(self, space: str) -> np.ndarray:
+        """Color at each node of the cube [size, size, size, 3]: hemoglobin, eumelanin, melanin; linear, unclipped."""
+        cells = self.luts.color(*self.cubic.nodes(), space=space)
+        return np.broadcast_to(cells, (self.size, self.size, self.size, 3))
+
+    def own_colors(self, space: str) -> np.ndarray:
+        """Color at each node of the set's own grid [N_h, N_e, N_m, 3]."""
+        return color.from_acescg(self.luts.color_lut.acescg, space, self.luts.pipeline)
+
+    @cached_property
+    def skins(self) -> np.ndarray:
+        """1,000 random skins [1000, 3] (melanin, eumelanin, hemoglobin), even in the axes' warps; fixed seed."""
+        t = np.random.default_rng(0).random((POINTS, 3))
+        axes = (getattr(self.grid, name) for name in AXES)
+        return np.stack([unwarped(axis, t[:, k]) for k, axis in enumerate(axes)], axis=1)
+
+    def coordinates(self, skins: np.ndarray) -> np.ndarray:
+        """Warped coordinates in 0 to 1 [N, 3] of skins [N, 3]: what a cube's input R, G, B are."""
+        axes = [getattr(self.grid, name) for name in AXES]
+        return np.stack([warped(axis, skins[:, k]) for k, axis in enumerate(axes)], axis=1)
+
+    @cached_property
+    def presets(self) -> list[Preset]:
+        """The presets that the LUTs cover."""
+        found = []
+        for name, skin in PRESETS.items():
+            point = skin.melanin, skin.eumelanin, skin.hemoglobin
+            axes = [getattr(self.grid, axis) for axis in AXES]
+            if all(axis.low <= value <= axis.high for axis, value in zip(axes, point, strict=True)):
+                profile = self.luts.profile(*point, space="srgb")
+                rings, clamped = expand.normalized(profile.energy)
+                edges = profile.radius_edges_mm
+                fit = burley.fit(rings, edges)
+                found.append(Preset(name, point, self.luts.color(*point), rings, edges, clamped, *fit))
+        return found
+
+
+def nested_size(luts: LutSet) -> int:
+    """Nodes of a cube among which the finest axis' own nodes are: resampling then adds a tenth of what 32 would.
+
+    >>> import lutgen
+    >>> nested_size(lutgen.load())
+    31
+    """
+    most = max(luts.color_lut.grid.shape)
+    return next((n for n in (2 * most - 1, most) if SIZES[0] <= n <= 64), max(most, SIZES[0]))
+
+
+def warped(axis: Axis, value) -> np.ndarray:
+    """Position in 0 to 1 along an axis after its warp; 0 for a fixed parameter."""
+    return axis.position(value) / max(axis.count - 1, 1)
+
+
+def unwarped(axis: Axis, t: np.ndarray) -> np.ndarray:
+    """The value at a position in 0 to 1 along an axis."""
+    if axis.count == 1:
+        return np.full(t.shape, axis.low)
+    p = axis.exponent
+    a, b = np.log([axis.low, axis.high]) if p == 0 else np.array([axis.low, axis.high]) ** p
+    even = a + (b - a) * t
+    return np.clip(np.exp(even) if p == 0 else even ** (1 / p), axis.low, axis.high)
+
+
+def trilinear(cells: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
+    """What a consumer reads [N, C] from cells [D, H, W, C] at warped coordinates [N, 3]: (x, y, z)."""
+    out = np.zeros((len(coordinates), cells.shape[-1]))
+    position = coordinates[:, ::-1] * (np.array(cells.shape[:3]) - 1)
+    low = np.minimum(position.astype(int), np.maximum(np.array(cells.shape[:3]) - 2, 0))
+    along = position - low
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.prod(np.where(corner, along, 1 - along), axis=1)
+        at = np.minimum(low + corner, np.array(cells.shape[:3]) - 1)
+        out += weight[:, None] * cells[tuple(at.T)]
+    return out
+
+
+def difference(found: np.ndarray, expected: np.ndarray) -> dict:
+    """Largest and mean absolute difference of two arrays, as plain values."""
+    off = np.abs(np.asarray(found, float) - expected)
+    return {"largest": float(off.max()), "mean": float(off.mean())}
+
+
+def warps(grid: Grid) -> dict[str, str]:
+    """The warp of each axis as code: its coordinate t in 0 to 1 from a value."""
+    found = {}
+    for name in AXES:
+        axis = getattr(grid, name)
+        p = axis.exponent
+        if axis.count == 1:
+            found[name] = f"t = 0.5 ({name} is {axis.low:.9g} throughout)"
+            continue
+        value = f"log({name})" if p == 0 else name if p == 1 else f"pow({name}, {p:.9g})"
+        a, b = (float(np.log(v) if p == 0 else v**p) for v in (axis.low, axis.high))
+        found[name] = f"t = ({value} - {a:.9g}) / {b - a:.9g}"
+    return found

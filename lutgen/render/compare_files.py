@@ -1,0 +1,132 @@
+"""Pictures to compare: what `lutgen render` and `lutgen view` write, any other EXR, or an 8-bit picture."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lutgen import color
+from lutgen.errors import InputError
+from lutgen.files import exr
+from lutgen.render import film as rendered
+
+COVERED = 0.99
+"""Share of a pixel that must be skin for it to count: outlines, which every renderer filters in its own way, do not."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Linear ACEScg [rows, columns, 3], covariance of its noise [rows, columns, 3, 3] or None, share of skin or None.
+
+    `notes`: what was taken for granted. `seed`: of the render that it is.
+    """
+
+    name: str
+    acescg: np.ndarray
+    covariance: np.ndarray | None
+    skin: np.ndarray | None
+    notes: tuple[str, ...] = ()
+    seed: int | None = None
+
+
+def read(path: Path | str) -> Picture:
+    """A picture from its file, first row on top.
+
+    EXR: R, G and B linear, in ACEScg where the file says so, else Rec. 709; `mask`, or else A, the share of skin; noise
+    from the moments that `lutgen render` keeps, or from `sigma.R`, `sigma.G`, `sigma.B` as if channels erred each by
+    itself. Other formats: 8-bit sRGB, A the share of skin. Raises InputError for a file that is missing or no picture,
+    and for NaN or infinite values.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"picture {path}: there is no such file")
+    found = _exr(path) if path.suffix.lower() == ".exr" else _display(path)
+    for what, values in (("", found.acescg), (" in its noise", found.covariance), (" in its mask", found.skin)):
+        broken = np.zeros((1, 1), bool) if values is None else ~np.isfinite(values)
+        if broken.any():
+            row, column = np.argwhere(broken)[0][:2]
+            raise InputError(
+                f"picture {path}: holds {int(broken.sum())} NaN or infinite values{what}, the first at row {row}, "
+                f"column {column}; render it anew"
+            )
+    return found
+
+
+def _exr(path: Path) -> Picture:
+    try:
+        part = next(iter(exr.read(path).values()))
+    except InputError as error:
+        raise InputError(f"picture {path}: not a whole OpenEXR file") from error
+    channels = part.channels
+    shapes = {values.shape for values in channels.values()}
+    if not set("RGB") <= set(channels) or len(shapes) != 1:
+        raise InputError(f"picture {path}: has channels {', '.join(channels)}; R, G and B of one size are needed")
+    rgb = part.stack("RGB").astype("f8")
+    skin = next((channels[name].astype("f8") for name in ("mask", "A") if name in channels), None)
+    if np.allclose(part.chromaticities, exr.ACESCG, atol=1e-4):
+        covariance, notes = _noise(part, rgb, path)
+        seed = part.attributes.get("render", {}).get("recipe", {}).get("seed")
+        return Picture(path.name, rgb, covariance, skin, notes, seed)
+    if not np.allclose(part.chromaticities, exr.REC709, atol=1e-4):
+        raise InputError(f"picture {path}: has other primaries than ACEScg and Rec. 709; convert it")
+    return Picture(path.name, _acescg(rgb), None, skin)
+
+
+def _noise(part: exr.Part, rgb: np.ndarray, path: Path) -> tuple[np.ndarray | None, tuple[str, ...]]:
+    """Covariance of a picture's pixels, and what has to be said about it."""
+    if "render" in part.attributes:
+        made = rendered.read(path)
+        guessed = (f"{path.name}: of one sample, so its noise is a guess",)
+        return made.covariance(), () if made.estimates > 1 else guessed
+    names = [f"sigma.{name}" for name in "RGB"]
+    if not set(names) <= set(part.channels):
+        return None, ()
+    sigma = np.stack([part.channels[name] for name in names], axis=-1).astype("f8")
+    covariance = np.zeros((*sigma.shape, 3))
+    covariance[..., range(3), range(3)] = sigma**2
+    return covariance, (f"{path.name}: noise of its channels is taken to be independent",)
+
+
+def _display(path: Path) -> Picture:
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path) as image:
+                seen = image.has_transparency_data
+                encoded = np.asarray(image.convert("RGBA"), "f8") / 255
+    except UnidentifiedImageError as error:
+        raise InputError(f"picture {path}: is no picture; an EXR or PNG is needed") from error
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise InputError(f"picture {path}: cannot be read ({error})") from error
+    note = f"{path.name}: 8-bit sRGB, so a tone curve in it counts as difference"
+    skin = encoded[..., 3] if seen else None
+    return Picture(path.name, _acescg(color.decode_srgb(encoded[..., :3])), None, skin, (note,))
+
+
+def _acescg(srgb: np.ndarray) -> np.ndarray:
+    return color.from_xyz(srgb @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg")
+
+
+def mask(a: Picture, b: Picture) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Pixels [rows, columns] that both show skin in, and what has to be said about them.
+
+    Without a mask in either, all pixels that are black in neither. Raises InputError where the sizes differ or no pixel
+    is left.
+    """
+    if a.acescg.shape != b.acescg.shape:
+        sizes = [f"{one.name} is {one.acescg.shape[1]} x {one.acescg.shape[0]}" for one in (a, b)]
+        raise InputError(f"{sizes[0]}, {sizes[1]}: pictures of one size are needed; render one of them anew")
+    masks = [one.skin >= COVERED for one in (a, b) if one.skin is not None]
+    notes = ()
+    if not masks:
+        masks = [np.any(one.acescg != 0, axis=-1) for one in (a, b)]
+        notes = ("no mask in either: every pixel that is not black counts",)
+    both = np.logical_and.reduce(masks)
+    if not both.any():
+        raise InputError(f"{a.name}, {b.name}: no pixel shows skin in both; nothing to compare")
+    return both, notes

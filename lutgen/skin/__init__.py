@@ -1,0 +1,1 @@
+"""What skin is made of: absorption and scattering of its chromophores, the layers that they make at a wavelength."""

@@ -1,0 +1,1 @@
+"""The window: panel, pointer, and Dear ImGui drawn by moderngl."""
