@@ -1,8 +1,8 @@
 """Monte Carlo by absorption-free paths: one trace per wavelength serves every absorption (white Monte Carlo).
 
 The kernels are kernels/solvers/path_table.cl (the walk into a bank of exit records) and tabulate.cl beside it (the
-bank into a Laplace table). Photons come in blocks of fixed size, each with its own random streams, so that any split into
-launches, in any order, gives the same records and the same fixed-point sums.
+bank into a Laplace table). Photons come in blocks of fixed size, each with its own random streams, so that any split
+into launches, in any order, gives the same records and the same fixed-point sums.
 """
 
 from __future__ import annotations
