@@ -11,8 +11,11 @@ from lutgen.exports.resampled import Report, Source, nested_size
 from lutgen.files import folders
 from lutgen.tables.lut_set import LutSet
 
-TARGETS = ("cube", "exr", "unreal", "unity", "godot", "three", "openpbr", "preintegrated")
-"""Targets by name; the module of that name in this package writes its folder."""
+TARGETS = {
+    "cube": "cube", "exr": "strips", "unreal": "unreal", "unity": "unity", "godot": "godot", "three": "three",
+    "openpbr": "openpbr", "preintegrated": "preintegrated",
+}  # fmt: skip
+"""Targets, and the module of this package that writes the folder of each."""
 README_LINES, ERROR_LINE = 10, 8
 """Lines of each README, and the one (from 0) that states the error."""
 
@@ -26,7 +29,7 @@ def targets_of(text: str) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
     if not names:
         raise InputError(f"to = {text!r}: allowed is {', '.join(TARGETS)} or all")
-    return TARGETS if names == ("all",) else tuple(one_of("to", name, TARGETS) for name in names)
+    return tuple(TARGETS) if names == ("all",) else tuple(one_of("to", name, tuple(TARGETS)) for name in names)
 
 
 def export(luts: LutSet, targets: tuple[str, ...], out: str | Path, size: int | None, force: bool, progress) -> dict:
@@ -43,7 +46,7 @@ def export(luts: LutSet, targets: tuple[str, ...], out: str | Path, size: int | 
             progress(name, None)
             folder = partial / name
             folder.mkdir()
-            report = importlib.import_module(f"lutgen.exports.{name}").write(source, folder)
+            report = importlib.import_module(f"lutgen.exports.{TARGETS[name]}").write(source, folder)
             (folder / "README.txt").write_text(_readme(name, report), encoding="utf-8")
             errors[name] = report.readme[ERROR_LINE], report.error
         facts = {key: value for key, value in luts.manifest.items() if key != "files"}
