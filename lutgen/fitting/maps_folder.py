@@ -49,8 +49,9 @@ def layers(luts: LutSet, found: Inversion, absolute: bool = False) -> dict[str, 
     if absolute:
         grid = luts.color_lut.grid
         for axis, values in ((grid.melanin, found.melanin), (grid.hemoglobin, found.hemoglobin)):
-            texels = axis.position(values) / max(axis.count - 1, 1)
-            result[f"{axis.name}_absolute"] = Layer(values, texels, _axis_formula(axis), f"{axis.name} as it is")
+            result[f"{axis.name}_absolute"] = Layer(
+                values, axis.warp(values), _axis_formula(axis), f"{axis.name} as it is"
+            )
     left = found.residual
     result["residual"] = Layer(
         left, left / np.float32(RESIDUAL_RANGE), f"CIEDE2000 difference from the balanced albedo: {RESIDUAL_RANGE:g} t",

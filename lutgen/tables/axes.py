@@ -66,38 +66,46 @@ class Axis:
             raise InputError(f"{self.name} axis: spacing = {shown(self.spacing)}: allowed is {allowed}")
         return value
 
-    def _warp(self, x):
+    def _evened(self, value):
+        """What nodes are even in: log, cube root or power of a value."""
         p = self.exponent
-        return np.log(x) if p == 0 else np.cbrt(x) if self.spacing == "cbrt" else np.asarray(x, float) ** p
+        return np.log(value) if p == 0 else np.cbrt(value) if self.spacing == "cbrt" else np.asarray(value, float) ** p
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """(a, b), what nodes are even in at `low` and at `high`: t = (value ** exponent - a) / (b - a), or of log."""
+        return float(self._evened(self.low)), float(self._evened(self.high))
+
+    def warp(self, value) -> np.ndarray:
+        """t in [0, 1] of a value, clamped to the axis; 0 for a fixed parameter."""
+        if self.count == 1:
+            return np.zeros_like(np.asarray(value, float))
+        a, b = self.ends
+        return (self._evened(np.clip(np.asarray(value, float), self.low, self.high)) - a) / (b - a)
+
+    def unwarp(self, t) -> np.ndarray:
+        """The value at t in [0, 1], the inverse of `warp`; single precision stays single."""
+        if self.count == 1:
+            return np.full(np.shape(t), self.low)
+        p, (a, b) = self.exponent, self.ends
+        even = a + t * (b - a)
+        value = np.exp(even) if p == 0 else even * even * even if self.spacing == "cbrt" else even ** (1 / p)
+        return np.clip(value, self.low, self.high)
 
     @property
     def values(self) -> np.ndarray:
         """Parameter value at each node, from low to high."""
-        if self.count == 1:
-            return np.array([self.low], float)
-        even = np.linspace(self._warp(self.low), self._warp(self.high), self.count)
-        p = self.exponent
-        inner = np.exp(even) if p == 0 else even ** (3.0 if self.spacing == "cbrt" else 1 / p)
-        inner[0], inner[-1] = self.low, self.high
-        return inner
+        values = self.unwarp(np.linspace(0, 1, self.count))
+        values[0], values[-1] = self.low, self.high
+        return values
 
     def position(self, value) -> np.ndarray:
         """Node index, with fraction, of a value; clamped to [0, count - 1], 0 for a fixed parameter."""
-        if self.count == 1:
-            return np.zeros_like(np.asarray(value, float))
-        a, b = self._warp(self.low), self._warp(self.high)
-        clamped = np.clip(np.asarray(value, float), self.low, self.high)
-        return (self._warp(clamped) - a) / (b - a) * (self.count - 1)
+        return self.warp(value) * (self.count - 1)
 
     def value(self, position) -> np.ndarray:
         """The value at a node index with fraction: the inverse of `position`."""
-        if self.count == 1:
-            return np.full(np.shape(position), self.low)
-        p, share = self.exponent, position / (self.count - 1)
-        if p == 0:
-            return np.clip(self.low * (self.high / self.low) ** share, self.low, self.high)
-        even = self.low**p + share * (self.high**p - self.low**p)
-        return np.clip(even * even * even if self.spacing == "cbrt" else even ** (1 / p), self.low, self.high)
+        return self.unwarp(position / max(self.count - 1, 1))
 
     def coordinate(self, value) -> np.ndarray:
         """Texture coordinate u in (0, 1) of a value; 0.5 for a fixed parameter."""

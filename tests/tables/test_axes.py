@@ -23,6 +23,16 @@ def test_nodes_and_coordinates_are_inverse(spacing, count):
 
 
 @settings(derandomize=True, max_examples=100)
+@given(st.sampled_from(SPACINGS), st.floats(0, 1), st.floats(0.001, 0.5))
+def test_warp_and_unwarp_are_inverse_both_ways(spacing, t, value):
+    """Each step rounds by 1e-16 of a number below 1, or of a logarithm below 7."""
+    axis = Axis("melanin", "1", 0.001, 0.5, 7, spacing)
+    assert float(axis.warp(axis.unwarp(t))) == pytest.approx(t, abs=1e-14)
+    assert float(axis.unwarp(axis.warp(value))) == pytest.approx(value, abs=1e-14)
+    assert axis.unwarp(np.float32(t)).dtype == np.float32
+
+
+@settings(derandomize=True, max_examples=100)
 @given(st.sampled_from(SPACINGS), st.integers(2, 40), st.floats(0.001, 0.5))
 def test_coordinate_is_the_stated_formula(spacing, count, value):
     axis = Axis("melanin", "1", 0.001, 0.5, count, spacing)
