@@ -1,8 +1,9 @@
 """Reflectance spectrum -> XYZ -> linear RGB, Lab and the CIEDE2000 difference; NumPy only.
 
 Two pipelines turn a spectrum into XYZ under D65. `default`: CIE 1931 2 degree functions under the D65 spectrum.
-`source`: the source document's, CIE 2015 2 degree functions under equal energy, XYZ scaled to the D65 white
-(0.9505, 1, 1.089) and the document's four-digit matrix. LUTs hold ACEScg (AP1 primaries, ACES white, CAT02).
+`source`: that of Zhang, Human face rendering: CIE 2015 2 degree functions under equal energy, XYZ scaled to the D65
+white (0.9505, 1, 1.089) and that document's four-digit matrix (lutgen/README.md, Color). LUTs hold ACEScg (AP1
+primaries, ACES white, CAT02).
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class Xoshiro128Plus:
 
 
 def fresnel_sin_tan(cosine: float, n_from: float, n_to: float) -> float:
-    """Fresnel reflectance as the source document prints it: sines and tangents (0/0 at normal incidence)."""
+    """Fresnel reflectance as Zhang (Human face rendering) prints it: sines and tangents (0/0 at normal incidence)."""
     a = np.arccos(cosine)
     sine = n_from / n_to * np.sin(a)
     if sine >= 1:
@@ -57,7 +57,7 @@ def fresnel_sin_tan(cosine: float, n_from: float, n_to: float) -> float:
 
 
 def document_walk(layers: list[Layer], photons: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """The source document's steps 1 to 5 for two layers of equal scattering, vectorized over photons, in doubles.
+    """Steps 1 to 5 of Zhang, Human face rendering, for two layers that scatter alike, by arrays of photons, in doubles.
 
     Weights fall by 1 - a/t at each event, roulette (1e-4, 10) ends them, hits at the interface continue the step.
     Returns exit radius and weight of each escape, for one unit of light falling on the surface per photon.

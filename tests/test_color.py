@@ -73,7 +73,8 @@ def test_white_is_white_in_both_pipelines():
             assert np.abs(color.from_xyz(xyz, "acescg") - 1).max() < 1.5e-3
 
 
-def test_pipelines_differ_on_the_documents_skins_by_what_physics_states():
+def test_pipelines_differ_on_the_documents_skins_by_what_the_readme_states():
+    """lutgen/README.md, Color."""
     for name, expected in (("source-caucasian", 1.5), ("source-asian", 1.3), ("source-african", 0.7)):
         spectrum = lutgen.spectrum(lutgen.preset(name))
         labs = [color.lab(color.spectrum_to_xyz(spectrum, pipeline)) for pipeline in color.PIPELINES]

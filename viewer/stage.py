@@ -54,7 +54,7 @@ class Stage:
 
     @property
     def milliseconds(self) -> dict[str, float]:
-        """What the passes of the last `draw` took: shadow, surface, scattering, composition (viewer/clock.py)."""
+        """What the last `draw` took by pass: shadow, surface, scattering, composition (viewer/measure/clock.py)."""
         return clock.milliseconds(self.timer)
 
 

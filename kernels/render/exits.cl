@@ -1,5 +1,5 @@
 // The flat walk by drawing: where light that enters leaves the flat skin, and with how much of each wavelength
-// (lutgen/render/exits.py).
+// (lutgen/render/flat_exits.py).
 #define EXITS __global const float *exit_edges, __global const float *exit_sums, __global const float *exit_energy, \
     __global const half *exit_paths
 #define EXITS_HERE {exit_edges, exit_sums, exit_energy, exit_paths}

@@ -1,6 +1,6 @@
-// Pictures by flat walks, one kernel from camera to light (the document's section 4): camera ray, hit, exit drawn, exit
-// on the real surface, light there. All wavelengths go through one exit; chromophores count half at its entry and half
-// at its exit.
+// Pictures by flat walks, one kernel from camera to light (Zhang, Human face rendering, section 4): camera ray, hit, exit
+// drawn, exit on the real surface, light there. All wavelengths go through one exit; chromophores count half at its
+// entry and half at its exit.
 
 // Radiance of what is seen through the skin from a start whose shares by wavelength are given; both become the next's.
 inline float3 scattered(const scene_t *s, const exits_t *exits, const surface_t *here, start_t *path, float *share,

@@ -1,4 +1,4 @@
-// What both walks over a queue share (lutgen/render/walks.py): where the next entry lies, and what leaves.
+// What both walks over a queue share (lutgen/render/mesh_walk.py): where the next entry lies, and what leaves.
 // A job walks the entries first, first + stride, ... of one wavelength; an exit lies where its entry lay.
 #define EMPTY 0xffffffffu
 

@@ -1,7 +1,7 @@
 // Pictures in stages over a queue: camera rays fill it with entries (`aim`), a walk of any kind turns entries into exits,
 // `gather` adds the light at the exits and fills the places of walks that go on, from skin to skin, with their next
 // entry; in the end `settle` adds each pixel's samples to its moments. A sample has one wavelength; WAVES in a row have
-// all of them and make one estimate. Structs: lutgen/render/queues.py.
+// all of them and make one estimate. Structs: lutgen/render/sample_queue.py.
 #define EMPTY 0xffffffffu
 
 inline void put3(__global float *to, float3 v) {

@@ -1,5 +1,5 @@
 // The scene on the device: what lies at a hit, read from the head's vertices and maps as the viewer's shaders read them.
-// Lengths in mm, colors in linear ACEScg. `view_t` is made from the host's dtype (lutgen/render/stage.py).
+// Lengths in mm, colors in linear ACEScg. `view_t` is made from the host's dtype (lutgen/render/device_scene.py).
 #define SCENE TREE, __global const view_t *view, __global const float8 *vertices, __global const int *corners, \
     __global const half *chromophore_map, __global const half *surface_map, __global const half *normal_map, \
     __global const half *detail_map, __global const float4 *pore_map, __global const float4 *environment_map, \
@@ -139,7 +139,7 @@ inline surface_t skin_at(const scene_t *s, hit_t hit, bool seen) {
 
 inline surface_t surface_at(const scene_t *s, hit_t hit) { return skin_at(s, hit, true); }
 
-// Absorption of epidermis and dermis above the life rate at wavelength k, 1/mm (lutgen/chromophores.py).
+// Absorption of epidermis and dermis above the life rate at wavelength k, 1/mm (lutgen/skin/chromophores.py).
 inline float2 absorption(const scene_t *s, int k, float3 skin) {
     __global const float *wave = s->waves + k * WAVE;
     float melanin = mix(wave[1], wave[0], skin.y);

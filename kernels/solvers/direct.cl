@@ -1,8 +1,8 @@
-// The source document's walk, steps 1 to 5, through LAYERS general layers (as MCML: Wang & Jacques 1992), W photons in
-// lock step. Each photon carries a weight; ABSORPTION says how it falls:
+// The walk of Zhang, Human face rendering, steps 1 to 5, through LAYERS layers (as MCML: Wang & Jacques 1992), W photons
+// in lock step. Each photon carries a weight; ABSORPTION says how it falls:
 //   0 albedo      w (1 - mu_a / mu_t) at each event, steps from mu_t: exact in expectation
 //   1 continuous  exp(-mu_a s) along the path, steps from mu_s: exact
-//   2 mixed       exp(-mu_a s) along the path, steps from mu_t: the document's section 3, too bright
+//   2 mixed       exp(-mu_a s) along the path, steps from mu_t: that document's section 3, too bright
 // A step that meets a surface ends there, is reflected or refracted by Fresnel's law, and goes on with what is left of
 // it. Weights under the threshold play roulette. A photon that ends leaves a record: exit radius, weight that left
 // above, weight that left below, and what each layer took.

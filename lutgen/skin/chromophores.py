@@ -32,7 +32,7 @@ def anisotropy(wavelength_nm):
 
 
 def scattering_source(wavelength_nm):
-    """Reduced scattering, 1/mm, as the source document and Donner & Jensen 2006 use it (twice Bashkatov's).
+    """Reduced scattering, 1/mm, as Zhang (Human face rendering) and Donner & Jensen 2006 use it (twice Bashkatov's).
 
     >>> round(float(scattering_source(450.0)), 4)
     9.2091

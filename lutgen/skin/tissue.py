@@ -48,9 +48,10 @@ class Layer:
 class Skin:
     """Two-layer skin: fractions of melanosomes, eumelanin and blood; oxygenation; epidermis thickness in mm.
 
-    `scattering` names the law of reduced scattering, `reading` what the law's value means (PHYSICS: `reduced` is
-    mu_s (1 - g) with Henyey-Greenstein g; `similarity` the same value with isotropic scattering; `literal` takes it
-    for mu_s itself). `saidi_*` are the fitted values of Saidi's law. Raises InputError outside the allowed ranges.
+    `scattering` names the law of reduced scattering, `reading` what the law's value means (lutgen/skin/README.md,
+    Readings: `reduced` is mu_s (1 - g) with Henyey-Greenstein g; `similarity` the same value with isotropic scattering;
+    `literal` takes it for mu_s itself). `saidi_*` are the fitted values of Saidi's law. Raises InputError outside the
+    allowed ranges.
 
     >>> Skin(0.0195, 0.7, 0.0088).oxygenation
     0.7
@@ -87,7 +88,7 @@ PRESETS = MappingProxyType(
         "tan": Skin(0.0439, 0.7, 0.0093),
         "brown": Skin(0.0734, 0.7, 0.0101),
         "dark": Skin(0.158, 0.7, 0.018),
-        # The three types of the source document, far from measured skin of those names.
+        # The three types of Zhang, Human face rendering, far from measured skin of those names.
         "source-caucasian": Skin(0.013, 0.7, 0.005),
         "source-asian": Skin(0.16, 0.0, 0.01),
         "source-african": Skin(0.43, 0.7, 0.01),

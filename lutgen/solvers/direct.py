@@ -1,10 +1,10 @@
-"""Monte Carlo through any stack of layers: the source document's walk, weights and roulette.
+"""Monte Carlo through any stack of layers: the walk, weights and roulette of Zhang, Human face rendering.
 
 Its kernel is kernels/solvers/direct.cl.
 
-The independent check of path tables, and what the document's section 3 compares: absorption by `albedo` (unbiased),
-`continuous` (unbiased) or `mixed` (the document's exponential with steps from mu_t, which equals the exact solution
-for a medium that scatters with mu_s + mu_a: too bright).
+The independent check of path tables, and what that document's section 3 compares (kernels/README.md, Three ways to
+absorb): absorption by `albedo` (unbiased), `continuous` (unbiased) or `mixed` (the document's exponential with steps
+from mu_t, which equals the exact solution for a medium that scatters with mu_s + mu_a: too bright).
 """
 
 from __future__ import annotations

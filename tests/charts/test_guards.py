@@ -111,7 +111,7 @@ def test_variances_add_with_squared_weights(draft):
         assert found == pytest.approx(expected, rel=1e-12)
 
 
-# test_manifest.py: on what reaches the kernel, not on `_sync` (a `_sync` that does nothing passes today's test)
+# On what reaches the kernel, not on `_sync` (a `_sync` that does nothing passes today's test)
 def test_files_and_folders_are_synced_by_the_system(draft, tmp_path, monkeypatch):
     synced, fsync = [], os.fsync
 

@@ -77,7 +77,8 @@ def test_a_fit_is_the_best_of_its_shape(rows):
 def test_one_light_profile_gets_worse_with_every_darker_tone(rows):
     for contender in (profile_shapes.ONE, profile_shapes.TABLE):
         assert (np.diff(worst(rows, contender)) > 0).all()
-    dark = of(rows, "dark", profile_shapes.ONE)[0]  # PHYSICS, rounded to .01; the truth of a quick contest has noise
+    # lutgen/solvers/README.md, Burley, rounded to .01; the truth of a quick contest has noise
+    dark = of(rows, "dark", profile_shapes.ONE)[0]
     assert (abs(dark - [0.18, 0.27, 0.48]) < 0.005 + 4 * of(rows, "dark", profile_shapes.NOISE)[0]).all()
 
 

@@ -45,7 +45,7 @@ def _number(cell: str) -> float | str:
 
 
 def test_exact_colors_are_those_of_the_solver(exact):
-    """Without photons: within the 3e-6 of reflectance that totals.py promises."""
+    """Without photons: within the 3e-6 of reflectance that lutgen/solvers/exact_totals.py promises."""
     found = settings.acescg(settings.at(exact, "5nm"), settings._weights("5nm"), SKINS)[..., 0]
     for melanin, eumelanin, hemoglobin, rgb in zip(*SKINS, found, strict=True):
         skin = lutgen.Skin(float(melanin), float(eumelanin), float(hemoglobin))

@@ -55,7 +55,7 @@ def test_on_its_own_tone_one_burley_is_as_good_as_the_shape_allows():
     found = viewer_scattering.errors(COSTS[-1:], EXTENT | {"tones": ("very-light",)})
     assert (
         2 * max(viewer_scattering._ee(found[0])) < max(viewer_scattering._ee(found[1])) < 0.06
-    )  # PHYSICS: .02 to .06 for skin tones
+    )  # lutgen/solvers/README.md, Burley: .02 to .06 for skin tones
 
 
 def test_the_chart_comes_as_svg_png_and_csv_of_its_rows(rows, tmp_path):

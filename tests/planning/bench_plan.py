@@ -1,4 +1,4 @@
-"""Does `lutgen plan` keep its word? Random scenes, each planned, baked and compared: `python tests/bench_plan.py`.
+"""Does `lutgen plan` keep its word? Random scenes, planned, baked, compared: `python tests/planning/bench_plan.py`.
 
 Three counts: plans whose recipe holds its tolerances when it is verified (eight bakes, a reference of its own); scenes
 whose predicted errors lie within a factor 2 of the measured ones; scenes where no rung down the ladder holds as well.

@@ -337,7 +337,7 @@ def test_a_recipe_that_is_too_coarse_does_not_hold(reference, middling):
 
 
 def test_random_scenes_hold_as_predicted(few_draws):
-    """The acceptance of tests/bench_plan.py in small: two scenes, two bakes each, a coarse reference."""
+    """The acceptance of tests/planning/bench_plan.py in small: two scenes, two bakes each, a coarse reference."""
     for row in bench_plan.rows(2, 2**18, bakes=2, seed=1):
         assert row.holds, bench_plan.line(row)
         assert 0.5 < row.color[0] / row.color[1] < 2

@@ -1,4 +1,4 @@
-"""Our walk inside a mesh against Mitsuba 3 on spheres of a scattering medium: `python tests/bench_mitsuba.py`.
+"""Our walk inside a mesh against Mitsuba 3 on spheres of a scattering medium: `python tests/render/bench_mitsuba.py`.
 
 Not a test: it needs Mitsuba, which lutgen does not (`pip install mitsuba`). What is compared is the share of even light
 that a sphere gives back, its mirror's part included: the mean radiance over the disc that an orthographic camera sees

@@ -181,7 +181,8 @@ def test_clear_skin_is_a_pane_of_glass():
 
 
 def test_light_that_comes_in_at_60_degrees_leaves_as_adding_doubling_says():
-    """The ratio to normal incidence on dark skin (PHYSICS: .91 to 1.28) at the quadrature's node nearest 60 degrees."""
+    """The ratio to normal incidence on dark skin at the quadrature's node nearest 60 degrees; .91 to 1.28 over all
+    skin (luts/README.md, What a value means)."""
     layers = lutgen.layers(lutgen.preset("dark"), 450.0)
     base, _ = adding_doubling.directions([1.0, INDEX])
     air = np.sqrt(np.maximum(1 - INDEX**2 * (1 - base**2), 0))

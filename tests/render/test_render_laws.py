@@ -134,8 +134,8 @@ def test_rings_of_the_renderer_are_fine_enough(monkeypatch):
 
 
 def test_oblique_light_stays_shallow():
-    """Of light that enters at 60 degrees .91 to 1.28 times as much leaves as along the normal (PHYSICS), the more the
-    more is absorbed; its exits lie ahead of where it entered."""
+    """Of light that enters at 60 degrees .91 to 1.28 times as much leaves as along the normal (luts/README.md,
+    What a value means), the more the more is absorbed; its exits lie ahead of where it entered."""
     luts, skin = lutgen.load(), (0.0439, 0.7, 0.0093)
     found = flat_exits.trace(ocl.choose(), luts, skin, PHOTONS)
     inside = np.sqrt(1 - 0.75 / 1.96)

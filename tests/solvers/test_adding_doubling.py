@@ -11,7 +11,7 @@ from lutgen.skin import chromophores
 from lutgen.skin.tissue import Layer
 from lutgen.solvers import adding_doubling, exact_totals
 
-TOLERANCE = 5e-5  # what PHYSICS asks of a deterministic solver
+TOLERANCE = 5e-5  # what tests/README.md, Tolerances, asks of a deterministic solver
 
 
 def diffuse(layers, **options):

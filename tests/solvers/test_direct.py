@@ -1,4 +1,4 @@
-"""The document's own walk through general layers: against published values, adding-doubling and the path table."""
+"""The walk of Zhang, Human face rendering, through general layers: against published values, two solvers."""
 
 from dataclasses import replace
 
@@ -87,7 +87,7 @@ def test_roulette_is_unbiased(threshold, survivors):
 
 
 def test_mixed_absorption_is_a_medium_of_greater_scattering():
-    """The document's section 3: steps from mu_t with exp(-mu_a s) solve mu_s + mu_a exactly, brighter than true."""
+    """Zhang, Human face rendering, section 3: steps from mu_t and exp(-mu_a s) solve mu_s + mu_a exactly."""
     layers = lutgen.layers(lutgen.Skin(0.43, 0.7, 0.01), 450)
     found = direct.shares(layers, 200_000, absorption="mixed")
     brighter = [replace(layer, mu_s_per_mm=layer.mu_s_per_mm + layer.mu_a_per_mm) for layer in layers]

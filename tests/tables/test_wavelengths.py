@@ -16,7 +16,7 @@ from lutgen.tables import make_wavelengths, wavelengths
 SKIN = Skin(0.02, 0.7, 0.01)
 FITTED = ("6", "8", "12")
 TARGETS = {"6": (0.53, 0.83), "8": (0.047, 0.069), "12": (0.005, 0.030)}
-"""Color errors (p95, maximum) that PHYSICS.md asks for."""
+"""Color errors (p95, maximum) that lutgen/tables/README.md, Wavelengths, states."""
 SETTINGS = {
     "oxygenation": SKIN,
     "epidermis .06": replace(SKIN, epidermis_mm=0.06),

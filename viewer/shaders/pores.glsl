@@ -1,4 +1,4 @@
-// Fine relief of the skin from a tile that repeats (lutgen/pores.py), laid on from three sides in mm: any mesh, no seam.
+// Fine relief of the skin from a tile that repeats (lutgen/head/pores.py), laid on from three sides in mm: any mesh.
 uniform sampler2D pore_map;       // slopes along x and y, the sum of their squares, openness
 uniform float pore_side_mm;
 

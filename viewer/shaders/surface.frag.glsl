@@ -14,7 +14,7 @@ uniform float roughness, specular, bumps, entry, transmission, light_radius, sha
 in vec3 view_position, view_normal, world_position, world_normal;
 in vec2 texcoord;
 in vec3 light_position;
-#ifdef PLAIN_ALBEDO                         // the skin of a game without lutgen (viewer/plain.py)
+#ifdef PLAIN_ALBEDO                         // the skin of a game without lutgen (viewer/measure/plain.py)
 uniform sampler2D albedo_map;
 layout(location = 0) out vec4 seen;         // rgb: radiance; a: 1 where there is a head
 vec4 entering, facing, skin, reflected_light, detail;

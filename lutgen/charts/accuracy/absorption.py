@@ -31,7 +31,7 @@ FACTORS = ("ns_per_event", "events_per_photon", "photons_to_1_percent", "ms_to_1
 QUICK, FULL = (2e7, 5), (1.5e8, 7)
 """Events of one timed walk, and rounds."""
 CAP = 9.0
-"""A capped photon lives 9/nu: what it then lacks weighs below exp(-9) (PHYSICS, the key)."""
+"""A capped photon lives 9/nu: what it then lacks weighs below exp(-9) (kernels/README.md, Lives)."""
 _FIXED_LIFE = "(vf)(mean_life)"
 _EVEN_BLOCKS = 64  # blocks that keep every core busy to the end
 _TITLES = ("time per event (ns)", "× events per photon", "× photons to 1 % error", "= time to 1 % error (ms)")

@@ -1,1 +1,1 @@
-"""The source document's results, and what they are compared with."""
+"""The results of the source document (Zhang, Human face rendering), and what they are compared with."""

@@ -1,8 +1,8 @@
 """Exact spectra and colors of many skins, with linear or with the document's exponential absorption; no photon traced.
 
 `linear` absorption (weights times 1 - mu_a/mu_t) is right in the mean, so adding-doubling gives it. `exponential`
-absorption with steps from mu_t, as the source document mixes it, is exactly linear absorption in a medium that
-scatters with mu_s + mu_a (PHYSICS, open point 2), so adding-doubling gives that too.
+absorption with steps from mu_t, as Zhang (Human face rendering) mixes it, is exactly linear absorption in a
+medium that scatters with mu_s + mu_a (kernels/README.md, Three ways to absorb), so adding-doubling gives that too.
 """
 
 from __future__ import annotations
