@@ -78,6 +78,13 @@ def without(*_, **__):
     raise MachineError("no OpenGL 3.3 (no display); on Debian or Ubuntu: apt-get install -y libegl1 libgl1-mesa-dri")
 
 
+DRAWN_BY = {
+    "speed": "speed", "profile_shapes": "shapes", "settings": "settings", "absorption": "walks",
+    "viewer_against_render": "truth",
+}  # fmt: skip
+"""The function of each module of `lutgen chart` that draws it."""
+
+
 @pytest.mark.parametrize("missing", ["package", "OpenGL"])
 def test_where_it_cannot_be_drawn_the_others_are(missing, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
@@ -86,9 +93,8 @@ def test_where_it_cannot_be_drawn_the_others_are(missing, tmp_path, monkeypatch)
     else:
         monkeypatch.setattr(viewer_scattering.viewer, "viewer", without)
     for module in (chart.speed, chart.profile_shapes, chart.settings, chart.absorption, chart.viewer_against_render):
-        monkeypatch.setattr(
-            module, module.__name__.split(".")[-1], lambda folder, *_: (folder / "x").write_text("") or ""
-        )
+        name = DRAWN_BY[module.__name__.split(".")[-1]]
+        monkeypatch.setattr(module, name, lambda folder, *_: (folder / "x").write_text("") or "")
     shown = chart.draw(tmp_path / "out", quick=True)
     assert list(shown) == ["speed-accuracy", "profiles", "settings", "walks", "viewing", "truth"]
     assert shown["viewing"].startswith("left out: no OpenGL 3.3 (no display)")

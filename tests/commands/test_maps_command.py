@@ -305,7 +305,7 @@ def test_colors_of_no_skin_are_refused_and_many_of_them_are_said(capsys, tmp_pat
 
 
 def test_where_to_see_it_names_the_set_and_can_be_pasted(capsys, tmp_path, luts, painted):
-    folder = lutgen.manifest.save(luts, tmp_path / "my set")
+    folder = lutgen.save(luts, tmp_path / "my set")
     out = tmp_path / "my maps"
     assert cli.main(["maps", str(save(tmp_path / "a.png", painted[2])), "--out", str(out), "--luts", str(folder)]) == 0
     assert f"lutgen view '{folder}' --maps '{out}' --set" in capsys.readouterr().out
@@ -313,7 +313,7 @@ def test_where_to_see_it_names_the_set_and_can_be_pasted(capsys, tmp_path, luts,
 
 @pytest.mark.parametrize("shape", [(1, 1), (3, 200), (70, 9)])
 def test_any_size_and_an_expanded_set(capsys, tmp_path, luts, shape):
-    folder = lutgen.manifest.save(luts.expand(oxygenation=0.95), tmp_path / "luts")
+    folder = lutgen.save(luts.expand(oxygenation=0.95), tmp_path / "luts")
     out = tmp_path / "out"
     albedo = save(tmp_path / "a.png", np.broadcast_to(luts.color(0.02, 0.7, 0.01), (*shape, 3)))
     said = made(capsys, albedo, "--out", out, "--luts", folder, "--target", "0.1,0.7,0.01")

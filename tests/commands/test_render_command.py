@@ -94,7 +94,8 @@ def test_a_killed_render_goes_on_and_an_interrupted_one_saves(tmp_path, head):
     """SIGKILL leaves a whole file of a moment before; Ctrl-C saves what there is and says so."""
     out = tmp_path / "a.exr"
     code = (
-        "import sys; from lutgen.render import progressive, exits; progressive.SAVE_SECONDS = 0.2; exits.EXITS = 8192;"
+        "import sys; from lutgen.render import progressive, flat_exits;"
+        "progressive.SAVE_SECONDS = 0.2; flat_exits.EXITS = 8192;"
         "from lutgen.cli import main; sys.exit(main(sys.argv[1:]))"
     )
     command = [sys.executable, "-c", code, "render", *SMALL, "--mesh", head, "--time", "300s", "--out", str(out)]

@@ -14,15 +14,15 @@ def test_it_is_used_mended_and_not_needed(tmp_path, monkeypatch):
         return {"a": np.arange(3)}
 
     for _ in range(2):
-        assert cache.kept("thing", ("cache",), made)["a"].tolist() == [0, 1, 2]
+        assert cache.kept("thing", ("files/cache",), made)["a"].tolist() == [0, 1, 2]
     assert len(calls) == 1
     (path,) = (tmp_path / "cache").iterdir()
     path.write_bytes(b"damaged")
-    assert cache.kept("thing", ("cache",), made)["a"].tolist() == [0, 1, 2]
+    assert cache.kept("thing", ("files/cache",), made)["a"].tolist() == [0, 1, 2]
     assert len(calls) == 2
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("LUTGEN_CACHE", str(tmp_path / "file" / "below"))
-    assert cache.kept("thing", ("cache",), made)["a"].tolist() == [0, 1, 2]
+    assert cache.kept("thing", ("files/cache",), made)["a"].tolist() == [0, 1, 2]
 
 
 def test_other_arrays_and_other_sources_are_other_things(tmp_path, monkeypatch):
@@ -32,8 +32,13 @@ def test_other_arrays_and_other_sources_are_other_things(tmp_path, monkeypatch):
     found = [
         cache.kept("thing", modules, lambda k=k: {"a": np.array(k)}, array)["a"].item()
         for k, (modules, array) in enumerate(
-            [(("cache",), mesh), (("cache",), other), (("errors",), mesh), (("cache",), mesh.reshape(3, 4))]
+            [
+                (("files/cache",), mesh),
+                (("files/cache",), other),
+                (("errors",), mesh),
+                (("files/cache",), mesh.reshape(3, 4)),
+            ]
         )
     ]
     assert found == [0, 1, 2, 3]
-    assert cache.kept("thing", ("cache",), lambda: {"a": np.array(9)}, mesh)["a"] == 0
+    assert cache.kept("thing", ("files/cache",), lambda: {"a": np.array(9)}, mesh)["a"] == 0

@@ -218,7 +218,7 @@ def test_keys_and_a_typed_value(screen):
     screen.until(lambda f: f["look"]["tier"] == "reference")
     screen.do("key", "s", "key", "k", "key", "question", "key", "p")
     found = screen.until(lambda f: f["look"]["split"] == "scattering" and f["look"]["melanin"] != Look().melanin)
-    assert found["look"]["melanin"] in {s.melanin for s in lutgen.tissue.PRESETS.values()}
+    assert found["look"]["melanin"] in {s.melanin for s in lutgen.PRESETS.values()}
     left, top, _, bottom = found["places"]["hemoglobin"]
     screen.do("mousemove", round(left + 20), round((top + bottom) / 2), "keydown", "ctrl", "click", 1, "keyup", "ctrl")
     screen.until(lambda f: f["typing"])

@@ -25,7 +25,7 @@ def missing() -> str:
 
 def costs(size: tuple[int, int], tiers: tuple[str, ...], rounds: int, progress: Callable) -> list:
     """What a frame of the built-in head costs by tier."""
-    app, timing, stages = (viewer.viewer(name) for name in ("app", "timing", "stages"))
+    app, timing, stages = (viewer.viewer(name) for name in ("app", "measure.timing", "stage"))
     opened = app.open_stage(lutgen.load(), *subject.model(None, None, None), size)
     try:
         _, found = timing.costs(opened, Look(), tiers, rounds=rounds, progress=lambda name: progress(name, None))
