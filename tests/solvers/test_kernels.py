@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference import Xoshiro128Plus, fresnel_sin_tan
 
-from lutgen.charts.stability.probing import WIDTHS, draws, evaluate
+from lutgen.charts.stability.kernel_values import WIDTHS, draws, evaluate
 from lutgen.solvers import adding_doubling
 
 RANDOM = np.random.default_rng(11)

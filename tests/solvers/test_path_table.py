@@ -8,7 +8,7 @@ from reference import TWO_LAYER, document_walk, two_layers
 
 import lutgen
 from lutgen import device as ocl
-from lutgen.charts.stability.probing import WIDTHS, wide
+from lutgen.charts.stability.kernel_values import WIDTHS, wide
 from lutgen.errors import MachineError
 from lutgen.skin import tissue
 from lutgen.skin.tissue import Layer

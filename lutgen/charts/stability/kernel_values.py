@@ -1,4 +1,4 @@
-"""Runs small kernels over the project's OpenCL functions, one value per lane: for tests and the table of margins."""
+"""What the kernels' own functions give: a small kernel around them, one value per lane."""
 
 from __future__ import annotations
 
