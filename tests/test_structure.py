@@ -1,7 +1,6 @@
 """The layout: imports point down, the wheel's only top-level name is lutgen, no heavy import on a light path."""
 
 import ast
-import re
 import shutil
 import subprocess
 import sys
@@ -170,11 +169,3 @@ def test_no_lock_file_and_no_path_of_a_machine():
         "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", "lutgen", "kernels", "viewer",
         "luts", "tests",
     }  # fmt: skip
-
-
-def test_the_readme_has_no_gap_and_its_pictures_exist():
-    text = (ROOT / "README.md").read_text()
-    assert "@@" not in text
-    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", text)
-    assert pictures
-    assert all((ROOT / picture).is_file() for picture in pictures)

@@ -1,10 +1,10 @@
 """The skin nearest to a measurement: what is compared, in which unit, and the descent to the least difference.
 
-*Model*: the table of exact totals (`solvers.totals`), far more right than anything measured. *Residual*: the color
-difference that is left (CIEDE2000, as its quadratic form at the measured color) and, for a spectrum, the difference in
-lightness of each wavelength, 116 cbrt(R), as a root mean square: both in one unit, so no weight is to be chosen. By
-wavelengths alone the color of measured skin is up to 2 off; with the color beside them melanin's sigma under noise is
-up to twice, hemoglobin's 1.6 times as large.
+*Model*: the table of exact totals (lutgen/solvers/exact_totals.py), far more right than anything measured. *Residual*:
+the color difference that is left (CIEDE2000, as its quadratic form at the measured color) and, for a spectrum, the
+difference in lightness of each wavelength, 116 cbrt(R), as a root mean square: both in one unit, so no weight is to be
+chosen. By wavelengths alone the color of measured skin is up to 2 off; with the color beside them melanin's sigma under
+noise is up to twice, hemoglobin's 1.6 times as large.
 """
 
 from __future__ import annotations

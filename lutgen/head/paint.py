@@ -1,8 +1,8 @@
 """Texture maps of any head with texture coordinates, painted by place on the skin so that no seam shows.
 
-Pigment, blood and gloss are painted where the head's points lie in the built-in head's frame (lutgen.placing), pores
-and wrinkles by place on the head itself, for they are as large on any head. Where no face is found, skin is painted as
-on the back of a head: mottled, without lips and freckles.
+Pigment, blood and gloss are painted where the head's points lie in the built-in head's frame (face.py), pores and
+wrinkles by place on the head itself, for they are as large on any head. Where no face is found, skin is painted as on
+the back of a head: mottled, without lips and freckles.
 """
 
 from __future__ import annotations

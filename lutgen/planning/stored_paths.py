@@ -1,4 +1,4 @@
-"""Paths traced once, by data/make_plan.py, from which the error of any bake of the default skin is worked out.
+"""Paths traced once, by make_stored_paths.py, from which the error of any bake of the default skin is worked out.
 
 At ten Chebyshev wavelengths, each covering all absorptions from 380 to 780 nm: scattering is smooth in wavelength, so
 they give the paths at any wavelength. Differences between two readings of these paths have no noise of their own.

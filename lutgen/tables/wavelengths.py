@@ -1,7 +1,7 @@
 """Which wavelengths a bake traces, and the weights that carry a spectrum there to XYZ; NumPy only.
 
 Skin spectra are smooth mixtures of few pigments, so eight well chosen wavelengths integrate them as well as eighty.
-`data/make_quadrature.py` chooses them and measures how well; both color pipelines share the wavelengths.
+make_wavelengths.py beside this file chooses them and measures how well; both color pipelines share the wavelengths.
 """
 
 from __future__ import annotations
