@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import operator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
 
 class InputError(ValueError):
@@ -71,6 +73,8 @@ def whole(name: str, value: object, low: int, high: int) -> int:
 
 def numbers(name: str, value: object) -> np.ndarray:
     """Return `value` as an array of floats; raise InputError that names it where it holds anything else."""
+    import numpy as np  # here: an error of the command line must not take the time to import it
+
     try:
         return np.asarray(value, float)
     except (TypeError, ValueError):

@@ -119,7 +119,7 @@ def test_an_interrupt_is_one_line_status_130(capsys, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lutgen.commands.devices.devices", interrupted)
+    monkeypatch.setattr("lutgen.commands.devices.run", interrupted)
     status, _, err = run(capsys, "devices")
     assert status == 130
     assert err.count("\n") == 1

@@ -1,4 +1,7 @@
-"""What `lutgen render` does: a head by Monte Carlo into an OpenEXR file that grows better while it runs."""
+"""A head by Monte Carlo: the truth that the viewer is compared with.
+
+The OpenEXR file grows better while it runs; the same command goes on where it stopped before.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import contextlib
 import hashlib
 import signal
 import time
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from importlib.metadata import version
@@ -15,16 +18,21 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.commands import Outcome
-from lutgen.commands.pictures import look_of, shown_of
-from lutgen.commands.progress import Progress
-from lutgen.errors import InputError, one_of, whole
+from lutgen import render
+from lutgen.commands import Outcome, device_options, progress, scene_options
+from lutgen.errors import InputError, whole
 from lutgen.files import folders
 from lutgen.files.texture_maps import Maps
+from lutgen.render import goal as goals
 from lutgen.scene import subject
 from lutgen.scene.look import Look
 from lutgen.solvers.paths import SEEDS
 
+EXAMPLES = (
+    "lutgen render --preset dark --spp 64 --size 320x320 --out dark.exr --png dark.png",
+    "lutgen render my-luts --walk mesh --time 10m --out head.exr",
+    "lutgen render --noise 1 --device 0 --seed 7 --out head.exr",
+)
 SIZE = "512x512"
 INTERRUPTED = 130
 _ODD = 0.01
@@ -33,82 +41,113 @@ _NOT_SEEN = ("tier", "split", "transmission", "exposure")
 """Values of a look that a render does not depend on."""
 
 
-def render(options: Namespace) -> Outcome:
-    """`lutgen render`: sample until --spp, --time or --noise, go on where the same command stopped before."""
+def arguments(parser: ArgumentParser) -> None:
+    """Add the scene, how light walks in it, when to stop, and the picture."""
+    scene_options.arguments(parser, SIZE)
+    parser.add_argument(
+        "--walk", choices=render.WALKS, default="flat",
+        help="flat: as if the skin were flat where light enters; flat-full: the same without its tables; "
+        "mesh: inside the head, which must be closed (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--spp", type=int,
+        help=f"samples a pixel, {goals.SAMPLES[0]} to {goals.SAMPLES[1]} (default: {goals.DEFAULT_SAMPLES} where "
+        "neither time nor noise is given)",
+    )  # fmt: skip
+    seconds, noise = "{:g} to {:g}".format(*goals.SECONDS), "{:g} to {:g}".format(*goals.NOISE)
+    parser.add_argument(
+        "--time", metavar="60s", help=f"stop after so long: 60s, 5m, 1h; {seconds} s (default: --spp's samples)"
+    )
+    parser.add_argument(
+        "--noise", type=float,
+        help=f"stop where a pixel's noise is this ΔE00 on average, {noise} (default: --spp's samples)",
+    )  # fmt: skip
+    parser.add_argument("--out", required=True, metavar="FILE.exr", help="picture to write, or to go on with")
+    parser.add_argument("--png", metavar="FILE", help="also as the viewer would show it (default: none)")
+    parser.add_argument(
+        "--seed", type=int, default=0,
+        help="of the random streams, {} to {} (default: %(default)s)".format(*SEEDS),
+    )  # fmt: skip
+    parser.add_argument("--force", action="store_true", help="replace a picture of other options")
+    device_options.arguments(parser)
+    progress.arguments(parser)
+
+
+def run(options: Namespace) -> Outcome:
+    """Sample until --spp, --time or --noise, go on where the same command stopped before."""
     from lutgen import device as ocl
     from lutgen.head import soundness
     from lutgen.render import device_scene, film, flat_walk, progressive
 
-    since = time.perf_counter()
-    goal = progressive.goal_of(options.spp, options.time, options.noise)
-    one_of("walk", options.walk, tuple(flat_walk.WALKS))
+    start = time.perf_counter()
+    goal = goals.goal_of(options.spp, options.time, options.noise)
     seed, size = whole("seed", options.seed, *SEEDS), subject.size_of(options.size or SIZE)
-    look, out = look_of(options), folders.check_file("out", options.out, ".exr")
+    look, out = scene_options.look_of(options), folders.check_file("out", options.out, ".exr")
     if options.png is not None:
         folders.check_file("png", options.png, ".png")
     device = ocl.choose(options.device)
-    luts, shape, given, around, notes = shown_of(options, look)
-    shape, more = soundness.mended(shape)
-    notes = (*notes, *more)
+    scene = scene_options.scene_of(options, look)
+    head, mends = soundness.mended(scene.head)
+    luts, notes = scene.luts, (*scene.notes, *mends)
     recipe = {
         "lutgen": version("lutgen"), "walk": options.walk, "size": list(size), "seed": seed, "kernels": _kernels(),
         "look": {name: value for name, value in asdict(look).items() if name not in _NOT_SEEN},
         "luts": {name: luts.manifest[name] for name in ("trace", "recipe", "extra_absorbers_per_mm")},
-        "head": _hash(shape.positions_mm, shape.normals, shape.uv, shape.triangles), "maps": _hash_of(given),
-        "environment": "studio" if around is None else _hash(around),
+        "head": _hash(head.positions_mm, head.normals, head.uv, head.triangles), "maps": _hash_of(scene.maps),
+        "environment": "studio" if scene.surroundings is None else _hash(scene.surroundings),
     }  # fmt: skip
     before = None if options.force or not out.exists() else _same(film.read(out), recipe, out)
-    seconds = {"head": time.perf_counter() - since}
-    with Progress(quiet=options.json) as progress, _interruptible() as stopped:
-        opened = _timed(seconds, "tree", lambda: device_scene.open_stage(
-            device, luts, shape, given, look, size, around, seed))  # fmt: skip
-        walk = _timed(seconds, "exits", lambda: flat_walk.WALKS[options.walk](opened, seed))
+    seconds = {"head": time.perf_counter() - start}
+    with progress.Progress(options) as tell, _interruptible() as stopped:
+        with _timed(seconds, "tree", tell):
+            stage = device_scene.open_stage(device, luts, head, scene.maps, look, size, scene.surroundings, seed)
+        with _timed(seconds, "exits", tell):
+            walk = flat_walk.WALKS[options.walk](stage, seed)
         notes = (*notes, *walk.facts.get("notes", ()))
         facts = {"recipe": recipe, "walk": walk.facts, "notes": list(notes), "device": device.name}
-        start = film.empty(size, walk.group, facts) if before is None else before
+        picture = film.empty(size, walk.group, facts) if before is None else before
 
-        def save(made: film.Picture, noise: float) -> None:
+        def save(picture: film.Picture, noise: float) -> None:
             """Write what there is so far."""
-            film.write(made, out)
+            film.write(picture, out)
             if options.png:
-                _write_png(made, look, options.png)
+                _write_png(picture, look, options.png)
 
-        progress("render", None)
-        made, tally, noise = progressive.render(
-            opened, walk, start, goal, save, stopped, progress, look.exposure
-        )  # fmt: skip
+        tell("render", None)
+        picture, tally, noise = progressive.render(stage, walk, picture, goal, save, stopped, tell, look.exposure)
         interrupted = stopped()
-    return _report(options, made, tally, noise, walk, seconds, notes, interrupted)
-
-
-def _report(options, made, tally, noise: float, walk, seconds: dict, notes: tuple, interrupted: bool) -> Outcome:
     seconds |= {"sample": tally.seconds.get("sample", 0.0), "write": tally.seconds.get("write", 0.0)}
-    sampled, walked = max(seconds["sample"], 1e-9), max(walk.seconds.get("walk", 0.0), 1e-9)
-    counts, probes = tally.counts, max(tally.counts.get("PROBES", 0), 1)
     result = {
-        "out": options.out, "samples": made.samples, "noise_delta_e00": noise if np.isfinite(noise) else None,
-        "walk": walk.facts, "rays": tally.rays, "rays_per_s": tally.rays / sampled,
-        "events": walk.events, "events_per_s": walk.events / walked, "counts": counts, "seconds": seconds,
-        "stages": walk.seconds, "notes": list(notes), "interrupted": interrupted,
+        "out": options.out, "samples": picture.samples, "noise_delta_e00": noise if np.isfinite(noise) else None,
+        "walk": walk.facts, "rays": tally.rays, "rays_per_s": tally.rays / max(seconds["sample"], 1e-9),
+        "events": walk.events, "events_per_s": walk.events / max(walk.seconds.get("walk", 0.0), 1e-9),
+        "counts": tally.counts, "seconds": seconds, "stages": walk.seconds, "notes": list(notes),
+        "interrupted": interrupted,
     }  # fmt: skip
-    whole_time = sum(seconds.values())
-    shares = ", ".join(f"{name} {100 * value / whole_time:.0f} %" for name, value in seconds.items())
-    inner = ", ".join(f"{name} {value:.2f} s" for name, value in walk.seconds.items())
+    return result, _text(result, bool(picture.mask.any())), INTERRUPTED if interrupted else 0
+
+
+def _text(result: dict, seen: bool) -> str:
+    """The figures in lines; `seen`: some of the head is in the picture."""
+    seconds, counts, rays = result["seconds"], result["counts"], result["rays"]
+    total, probes, noise = sum(seconds.values()), max(counts.get("PROBES", 0), 1), result["noise_delta_e00"]
+    shares = ", ".join(f"{name} {100 * value / total:.0f} %" for name, value in seconds.items())
+    stages = ", ".join(f"{name} {value:.2f} s" for name, value in result["stages"].items())
     kinds = ", ".join(
-        f"{name} {100 * counts.get(key, 0) / max(tally.rays, 1):.0f} %"
+        f"{name} {100 * counts.get(key, 0) / max(rays, 1):.0f} %"
         for name, key in (("camera", "CAMERA_RAYS"), ("exit", "PROBES"), ("sun", "SUN_RAYS"), ("sky", "SKY_RAYS"))
     )
-    said = "unknown from so few" if not np.isfinite(noise) else f"ΔE00 {noise:.2f} a pixel"
     lines = [
-        f"{options.out}: {made.samples} samples, noise {said}"
-        + (" (interrupted; the same command goes on)" if interrupted else ""),
-        f"{tally.rays / 1e6:.1f} M rays, {tally.rays / sampled / 1e6:.2f} M/s ({kinds}); "
-        f"{walk.events / 1e9:.2f} G events, {walk.events / walked / 1e6:.0f} M/s",
-        f"{whole_time:.1f} s: {shares}; stages: {inner}",
+        f"{result['out']}: {result['samples']} samples, noise "
+        + ("unknown from so few" if noise is None else f"ΔE00 {noise:.2f} a pixel")
+        + (" (interrupted; the same command goes on)" if result["interrupted"] else ""),
+        f"{rays / 1e6:.1f} M rays, {result['rays_per_s'] / 1e6:.2f} M/s ({kinds}); "
+        f"{result['events'] / 1e9:.2f} G events, {result['events_per_s'] / 1e6:.0f} M/s",
+        f"{total:.1f} s: {shares}; stages: {stages}",
         f"exits without a surface {100 * counts.get('MISSES', 0) / probes:.2g} %, on one that faces away "
         f"{100 * counts.get('REJECTED', 0) / probes:.2g} %: lit where they entered",
     ]
-    photons = walk.facts.get("photons", {})
+    photons = result["walk"].get("photons", {})
     if photons.get("lost") or photons.get("unfinished"):
         lines.append(
             f"of {photons['entered']} walks {photons['lost']} were lost at folds of the mesh, {photons['unfinished']} "
@@ -121,16 +160,18 @@ def _report(options, made, tally, noise: float, walk, seconds: dict, notes: tupl
         )
     if counts.get("BROKEN"):
         lines.append(f"{counts['BROKEN']} samples were not finite and were left out")
-    if not made.mask.any():
+    if not seen:
         lines.append("no head is in the picture: change distance_mm or target_mm")
-    return result, "\n".join([*lines, *notes]), INTERRUPTED if interrupted else 0
+    return "\n".join([*lines, *result["notes"]])
 
 
-def _timed(seconds: dict, name: str, act: Callable):
-    since = time.perf_counter()
-    done = act()
-    seconds[name] = time.perf_counter() - since
-    return done
+@contextlib.contextmanager
+def _timed(seconds: dict[str, float], stage: str, tell: Callable) -> Iterator[None]:
+    """Tell of a stage, and put down its seconds."""
+    tell(stage, None)
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start
 
 
 @contextlib.contextmanager
@@ -168,18 +209,18 @@ def _hash(*arrays: np.ndarray | None) -> str:
     return mark.hexdigest()[:16]
 
 
-def _hash_of(given: Maps) -> str:
-    marks = _hash(given.chromophores, given.surface, given.normal, given.albedo)
-    return f"{marks} {given.full_contrast_melanin:g}"
+def _hash_of(maps: Maps) -> str:
+    mark = _hash(maps.chromophores, maps.surface, maps.normal, maps.albedo)
+    return f"{mark} {maps.full_contrast_melanin:g}"
 
 
 def _same(before, recipe: dict, out: Path):
-    """The picture to go on with; InputError that names what differs where it was made of something else."""
-    found, wanted = _flat(before.facts.get("recipe", {})), _flat(recipe)
+    """The picture to go on with; InputError that names what differs where it is of something else."""
+    earlier = _flat(before.facts.get("recipe", {}))
     differ = [
-        f"{name} {_short(found.get(name))}, now {_short(value)}"
-        for name, value in wanted.items()
-        if found.get(name) != value
+        f"{name} {_short(earlier.get(name))}, now {_short(value)}"
+        for name, value in _flat(recipe).items()
+        if earlier.get(name) != value
     ]
     if differ:
         raise InputError(
@@ -191,13 +232,13 @@ def _same(before, recipe: dict, out: Path):
 
 def _flat(values: dict) -> dict:
     """A recipe as plain values by dotted names, tuples as lists as JSON has them."""
-    out = {}
+    flat = {}
     for name, value in values.items():
         if isinstance(value, dict):
-            out |= {f"{name}.{key}": one for key, one in _flat(value).items()}
+            flat |= {f"{name}.{key}": inner for key, inner in _flat(value).items()}
         else:
-            out[name] = list(value) if isinstance(value, tuple) else value
-    return out
+            flat[name] = list(value) if isinstance(value, tuple) else value
+    return flat
 
 
 def _short(value: object) -> str:
@@ -205,10 +246,10 @@ def _short(value: object) -> str:
     return text if len(text) <= 24 else text[:21] + "..."
 
 
-def _write_png(made, look: Look, name: str) -> None:
+def _write_png(picture, look: Look, name: str) -> None:
     from PIL import Image
 
     from lutgen.scene import display
 
     with folders.whole_file("png", name) as partial:
-        Image.fromarray(display.picture(made.rgb, made.mask, look.exposure)).save(partial, format="PNG")
+        Image.fromarray(display.picture(picture.rgb, picture.mask, look.exposure)).save(partial, format="PNG")

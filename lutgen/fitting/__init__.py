@@ -30,7 +30,7 @@ TRADE_OFF, UNSURE = 0.9, 0.3
 """Correlation from which two parameters trade off; sigma (relative for melanin and hemoglobin) that says little."""
 SEEN_NM = (420.0, 680.0)
 """A spectrum that covers less is no fair picture of a color: beyond lie 1.2, 0.2 and 3.2 % of X, Y and Z."""
-_NOISE = {"spectrum": (1e-6, 0.1), "color": (1e-3, 20.0)}
+NOISE = {"spectrum": (1e-6, 0.1), "color": (1e-3, 20.0)}
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def fit(
     if not isinstance(base, Skin):
         raise InputError(f"base = {shown(base)}: a lutgen.Skin is needed; lutgen.preset(name) gives one")
     if noise is not None:
-        noise = in_range("noise", noise, *_NOISE["color" if data.reflectance is None else "spectrum"])
+        noise = in_range("noise", noise, *NOISE["color" if data.reflectance is None else "spectrum"])
     names = _names(parameters, data, noise)
     task = nearest.problem(data, names, base, SPECULAR if specular_included else 0.0)
     at = nearest.solve(task)

@@ -12,6 +12,7 @@ from lutgen.errors import InputError, MachineError, in_range
 
 SUFFIXES = (".glb", ".gltf", ".obj")
 HEAD_MM, BUST_MM = 250.0, 380.0
+MM_PER_UNIT = (1e-6, 1e6)
 _LEE = "https://raw.githubusercontent.com/mrdoob/three.js/r187/examples/models/gltf/LeePerrySmith/"
 SCANS = {
     "lee-perry-smith": {
@@ -74,7 +75,7 @@ def load(path: Path, mm_per_unit: float | None = None, flip_v: bool = False) -> 
     if not path.is_file():
         raise InputError(f"mesh {path}: there is no such file")
     if mm_per_unit is not None:
-        mm_per_unit = in_range("mm_per_unit", mm_per_unit, 1e-6, 1e6)
+        mm_per_unit = in_range("mm_per_unit", mm_per_unit, *MM_PER_UNIT)
     whole = _read(path)
     positions = np.asarray(whole.vertices, float)
     triangles = np.asarray(whole.faces, "i4")

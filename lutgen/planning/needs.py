@@ -21,6 +21,7 @@ VARIABLE = tuple(ALLOWED_TONES)
 USUAL = {name: getattr(PRESETS["light"], name) for name in VARIABLE}
 """The value of what neither the tones nor `vary` name: the default recipe's skin."""
 TOLERANCE, EE_TOLERANCE, MM_PER_PIXEL = (0.02, 20.0), (0.001, 0.5), (1e-3, 1e3)
+BYTES, SECONDS = (1, 2**40), (0.0, 1e6)
 EE_PER_DELTA_E00 = 1 / 20
 """The usual tolerance of encircled energy: shares of .05 are about as visible as a color difference of 1."""
 OWN_PIXEL = 0.56
@@ -59,9 +60,9 @@ class Needs:
         put("ee_tolerance", in_range("ee_tolerance", self.ee_tolerance, *EE_TOLERANCE))
         put("mm_per_pixel", in_range("mm_per_pixel", self.mm_per_pixel, *MM_PER_PIXEL))
         if self.bytes is not None:
-            put("bytes", whole("bytes", self.bytes, 1, 2**40))
+            put("bytes", whole("bytes", self.bytes, *BYTES))
         if self.seconds is not None:
-            put("seconds", in_range("seconds", self.seconds, 0, 1e6))
+            put("seconds", in_range("seconds", self.seconds, *SECONDS))
 
     @property
     def varying(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from lutgen import device as ocl
+from lutgen import render
 from lutgen.render import device_scene, flat_exits, mesh_walk
 from lutgen.render.device_scene import Stage
 from lutgen.render.mesh_walk import REACH
@@ -85,5 +86,5 @@ def flat(on: Stage, seed: int = 0, photons: int | None = None) -> Flat:
     return Flat(on, built, flat_exits.buffers(on.device, found), facts, found.events, seconds)
 
 
-WALKS: dict[str, Callable[..., Walk]] = {"flat": flat, "flat-full": mesh_walk.flat, "mesh": mesh_walk.inside}
+WALKS: dict[str, Callable[..., Walk]] = dict(zip(render.WALKS, (flat, mesh_walk.flat, mesh_walk.inside), strict=True))
 """By the name that --walk takes."""

@@ -18,7 +18,7 @@ EPIDERMIS_MM = (0.001, 0.5)
 _LAYER_RANGES = {
     "thickness_mm": (0, np.inf), "mu_a_per_mm": (0, 1e6), "mu_s_per_mm": (0, 1e6), "g": (-0.9999, 0.9999), "n": (1, 3),
 }  # fmt: skip
-_SKIN_RANGES = {
+SKIN_RANGES = {
     "melanin": chromophores.MELANIN, "eumelanin": chromophores.EUMELANIN, "hemoglobin": chromophores.HEMOGLOBIN,
     "oxygenation": chromophores.OXYGENATION, "epidermis_mm": EPIDERMIS_MM,
     "saidi_a_per_mm": (0, 100), "saidi_b_nm4_per_mm": (0, 1e13),
@@ -68,7 +68,7 @@ class Skin:
     saidi_b_nm4_per_mm: float = 8.4e10
 
     def __post_init__(self):
-        for name, (low, high) in _SKIN_RANGES.items():
+        for name, (low, high) in SKIN_RANGES.items():
             object.__setattr__(self, name, in_range(name, getattr(self, name), low, high))
         one_of("scattering", self.scattering, LAWS)
         one_of("reading", self.reading, READINGS)

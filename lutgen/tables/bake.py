@@ -71,7 +71,7 @@ def bake(
     manifest = _describe(recipe, rule, chosen, medium, clock, np.asarray(clamped))
     luts = LutSet(color_lut, profile_lut, paths, manifest)
     manifest["error"] = measure(luts, exact)
-    clock.stage("done")
+    clock.end()
     manifest["seconds"] = clock.seconds
     return luts
 
@@ -154,11 +154,14 @@ class _Clock:
 
     def stage(self, name: str) -> None:
         """End the running stage and begin the next."""
-        now = time.perf_counter()
-        if self._name:
-            self.seconds[self._name] = round(now - self._since, 4)
-        self._name, self._since = name, now
+        self.end()
+        self._name, self._since = name, time.perf_counter()
         self.tell(name, None)
+
+    def end(self) -> None:
+        """Put down the seconds of the running stage."""
+        if self._name:
+            self.seconds[self._name] = round(time.perf_counter() - self._since, 4)
 
     def launched(self, tally: path_table.Tally) -> None:
         """Pass on what a launch has done."""

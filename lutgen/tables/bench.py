@@ -17,7 +17,7 @@ from lutgen import device as ocl
 from lutgen.errors import MachineError
 from lutgen.skin.tissue import preset
 from lutgen.solvers import path_table
-from lutgen.tables.bake import skin_medium
+from lutgen.tables.bake import Progress, skin_medium
 
 ROUNDS = 5
 _WAVELENGTHS_NM = np.array([460.0, 550.0, 640.0])
@@ -27,10 +27,14 @@ FLOPS_PER_EVENT = 72
 _CHAINS, _PEAK_ROUNDS, _PEAK_ITEMS = 12, 200_000, 64
 
 
-def run(device: str | None) -> dict:
-    """All figures, as `lutgen bench --json` prints them."""
+def run(device: str | None, progress: Progress = lambda stage, tally: None) -> dict:
+    """All figures, as `lutgen bench --json` prints them; `progress` is told each stage."""
     chosen = ocl.choose(device)
-    return {"trace": trace(chosen), "bake": bakes(device), "expand_s": expansion()}
+    progress("trace", None)
+    rates = trace(chosen)
+    times = bakes(device, progress)
+    progress("expand", None)
+    return {"trace": rates, "bake": times, "expand_s": expansion()}
 
 
 def trace(chosen: ocl.Device) -> dict:
@@ -73,11 +77,12 @@ def _peak_flops(device: ocl.Device) -> float:
     return 2.0 * device.lanes * _CHAINS * _PEAK_ROUNDS * _PEAK_ITEMS / (time.perf_counter() - start)
 
 
-def bakes(device: str | None) -> dict:
+def bakes(device: str | None, progress: Progress = lambda stage, tally: None) -> dict:
     """Time by stage and error of a bake of each quality, as its own process with a warm kernel cache."""
     results = {}
     with tempfile.TemporaryDirectory() as folder:
         for quality in ("draft", "draft", "standard", "reference"):  # the first one warms the kernel cache
+            progress(f"bake, {quality}", None)
             out = Path(folder) / f"{quality}-{len(list(Path(folder).iterdir()))}"
             command = [sys.executable, "-m", "lutgen.cli", "bake", "--quality", quality, "--out", str(out), "--json"]
             done = subprocess.run(command + (["--device", device] if device else []), capture_output=True, text=True)

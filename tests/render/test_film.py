@@ -8,7 +8,7 @@ from rendering import PHOTONS, SUN, ball, opened, sampled
 
 import lutgen
 from lutgen import color
-from lutgen.render import film, flat_walk, progressive
+from lutgen.render import film, flat_walk, goal, progressive
 
 LOOK = replace(SUN, environment=0.85, target_mm=(0, 0, 0), distance_mm=500, light_azimuth=40.0, specular=1)
 LIGHT_SUN = replace(LOOK, light=3.0)
@@ -150,6 +150,6 @@ def test_what_is_no_render_is_one_line(tmp_path):
 
 
 def test_goals_are_read_and_checked():
-    assert progressive.goal_of(None, None, None).samples == progressive.DEFAULT_SAMPLES
-    assert progressive.goal_of(None, "90", None).seconds == 90
-    assert progressive.goal_of(7, "1.5h", 0.5) == progressive.Goal(7, 5400, 0.5)
+    assert goal.goal_of(None, None, None).samples == goal.DEFAULT_SAMPLES
+    assert goal.goal_of(None, "90", None).seconds == 90
+    assert goal.goal_of(7, "1.5h", 0.5) == goal.Goal(7, 5400, 0.5)

@@ -8,7 +8,7 @@ import trimesh
 
 import lutgen
 from lutgen import device as ocl
-from lutgen.render import distance, mesh_walk, progressive, sample_queue
+from lutgen.render import distance, goal, mesh_walk, sample_queue
 from lutgen.skin.tissue import Layer, Skin
 from lutgen.solvers import adding_doubling, path_table
 from lutgen.solvers.path_table import Medium
@@ -247,7 +247,7 @@ def test_full_walks_have_the_profile_of_the_set(inside, preset):
 def test_no_two_blocks_share_a_stream_however_large_the_picture():
     """The largest picture in the smallest blocks, first and last estimates and turns."""
     through, pixels = medium(), 4096 * 4096
-    last = progressive.SAMPLES[1] - 1
+    last = goal.SAMPLES[1] - 1
     keys = []
     for begin in (0, 2**20, pixels - 1024):
         for first in (0, 1, 2**15, last):

@@ -37,11 +37,13 @@ class Cost:
     ratios: tuple[float, float]
 
 
-def report(luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int]) -> dict:
+def report(
+    luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int], progress: Callable[[str], None] = lambda name: None
+) -> dict:
     """What `lutgen bench --viewer --json` prints of a head, its maps and a LUT set."""
     stage = app.open_stage(luts, shape, given, size)
     try:
-        game, tiers = costs(stage, Look(), rounds=ROUNDS)
+        game, tiers = costs(stage, Look(), rounds=ROUNDS, progress=progress)
         return {
             "renderer": gl.context().info["GL_RENDERER"], "size": list(size), "rounds": ROUNDS, "plain": asdict(game),
             "tiers": {cost.name: asdict(cost) for cost in tiers}, "oxygenation_ms": oxygenation(stage),
