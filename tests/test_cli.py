@@ -26,7 +26,7 @@ def run(capsys, *arguments):
 
 def test_bake_info_check(capsys, tmp_path):
     out = tmp_path / "luts"
-    status, text, err = run(capsys, "bake", "--quality", "draft", "--photons", 8192, "--out", out)
+    status, text, err = run(capsys, "bake", "--quality", "draft", "--photons", 8192, "--out", out, "--quiet")
     assert (status, err) == (0, "")
     assert text.splitlines()[0] == str(out)
     assert "ΔE00 max" in text
@@ -161,7 +161,7 @@ BAD = [
     (["bake", "--wavelengths", "9"], "wavelengths = '9': allowed is 6, 8, 12, 10nm, 5nm"),
     (["bake", "--device", "abacus"], "device = 'abacus': no device matches"),
     (["bake", "absent.toml"], "recipe absent.toml: cannot be read"),
-    (["bake", "--out", "/proc/x"], "out = /proc/x"),
+    (["bake", "--quiet", "--out", "/proc/x"], "out = /proc/x"),
     (["swatch"], "--preset or --melanin is needed"),
     (["swatch", "--preset", "pale"], "preset = 'pale': allowed is very-light, light"),
     (["swatch", "--melanin", "nan"], "melanin = nan: allowed is 0.001 to 0.5"),

@@ -114,14 +114,15 @@ def run(options: Namespace) -> Outcome:
 def no_skin(residual: dict, source: Path) -> str | None:
     """A line about colors that few skins have, or None; InputError where half are those of none, as `fit` says it."""
     check = "are its channels in order, and is it an albedo of skin?"
-    if residual["delta_e00_median"] >= NO_SKIN:
+    median, share = residual["delta_e00_median"], residual["out_of_reach_share"]
+    if median >= NO_SKIN:
         raise InputError(
-            f"albedo {source}: its colors are those of no skin (ΔE00 {residual['delta_e00_median']:.1f} from the nearest "
-            f"at the median; allowed is below {NO_SKIN:g}); {check}"
+            f"albedo {source}: its colors are those of no skin (ΔE00 {median:.1f} from the nearest at the median; "
+            f"allowed is below {NO_SKIN:g}); {check}"
         )
-    if residual["out_of_reach_share"] < _MANY:
+    if share < _MANY:
         return None
-    return f"{residual['out_of_reach_share']:.0%} of the texels are farther than {maps_folder.REACH:g} from any skin: {check}"
+    return f"{share:.0%} of the texels are farther than {maps_folder.REACH:g} from any skin: {check}"
 
 
 def light(balance: str, exposure: str | None) -> tuple[np.ndarray, str]:
