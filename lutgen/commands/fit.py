@@ -25,7 +25,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "measured", nargs="?", metavar="SPECTRUM.csv|COLOR",
         help="CSV with columns wavelength_nm and reflectance (0 to 1), 380 to 780 nm; or '#rrggbb' (quoted), "
-        "srgb:r,g,b (0 to 1, encoded), linear:r,g,b (linear sRGB), lab:L,a,b or xyz:X,Y,Z, under D65",
+        "srgb:r,g,b (0 to 1, encoded), linear:r,g,b (linear sRGB), lab:L,a,b or xyz:X,Y,Z, under D65 (no default)",
     )  # fmt: skip
     parser.add_argument(
         "--parameters", metavar="NAME[,NAME...]",
