@@ -33,7 +33,8 @@ def anchor(heading: str) -> str:
 
 def links(path: Path) -> list[tuple[Path, str]]:
     """Targets and fragments of a README's relative links and pictures."""
-    targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", prose(path)) if "://" not in target]
+    matches = re.findall(r"\]\(([^)\s]+)\)|\bsrc=\"([^\"]+)\"", prose(path))
+    targets = [link or picture for link, picture in matches if "://" not in link + picture]
     pairs = (unquote(target).partition("#") for target in targets)
     return [((path.parent / target).resolve() if target else path, fragment) for target, _, fragment in pairs]
 
