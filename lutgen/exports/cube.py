@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.exports.resampled import MADE, MEANING, Report, Source, difference, trilinear, warps
+from lutgen.exports.resampled import MADE, MEANING, Report, Source
+from lutgen.tables import shader_axes
 
 FILE = "skin.cube"
 DECIMALS = 7
@@ -21,7 +22,7 @@ def text(source: Source, title: str) -> tuple[str, np.ndarray]:
     head = [
         f'TITLE "{title}"',
         "# Input is a skin: R melanin, G eumelanin, B hemoglobin, each a coordinate t in 0 to 1 after its axis warp:",
-        *(f"# {name}: {code}" for name, code in warps(source.grid).items()),
+        *(f"# {name}: {code}" for name, code in shader_axes.formulas(source.grid).items()),
         "# Output is diffuse color: linear Rec. 709 (D65), clipped to 0 to 1. Interpolate trilinearly.",
         f"LUT_3D_SIZE {source.size}",
         "DOMAIN_MIN 0.0 0.0 0.0",
@@ -35,8 +36,8 @@ def error(source: Source, values: np.ndarray) -> dict:
     """What a reader of the values [N, N, N, 3] gets at random skins against the set's colors, and the share of these
     that lies outside 0 to 1."""
     exact = source.luts.color(*source.skins.T)
-    read = trilinear(values, source.coordinates(source.skins))
-    return {"color": difference(read, exact), "clipped_share": float(np.mean((exact < 0) | (exact > 1)))}
+    clipped = float(np.mean((exact < 0) | (exact > 1)))
+    return {"color": source.color_error(source.cubic, values), "clipped_share": clipped}
 
 
 def write(source: Source, folder: Path) -> Report:
@@ -48,7 +49,7 @@ def write(source: Source, folder: Path) -> Report:
     return Report((
         f"{FILE}: 3-D LUT of skin color, {n} x {n} x {n} nodes, for OpenColorIO, Unity and tools.",
         "Input R, G, B: melanin, eumelanin, hemoglobin as coordinates t in 0 to 1 after the axis warp:",
-        "; ".join(warps(source.grid).values()),
+        "; ".join(shader_axes.formulas(source.grid).values()),
         "Output: diffuse color in linear Rec. 709 (sRGB primaries, D65), clipped to 0 to 1; no transfer curve.",
         f"Half texel: in a texture of it u = (t * {n - 1} + 0.5) / {n}; readers of .cube files do this themselves.",
         "Encoding: text, red (melanin) fastest, 7 fixed decimals, domain 0 to 1.",

@@ -13,8 +13,9 @@ import numpy as np
 
 from lutgen.exports import lookup
 from lutgen.exports.engine_textures import slices
-from lutgen.exports.resampled import AXES, MADE, MEANING, Preset, Report, Source, difference, trilinear, warps
+from lutgen.exports.resampled import AXES, MADE, MEANING, Preset, Report, Source, difference
 from lutgen.files import exr
+from lutgen.tables import shader_axes
 
 COLOR, PROFILE, SHADER, SCENE = "skin_color.exr", "skin_profile.exr", "skin.gdshader", "skin.tscn"
 _KEPT = {"compress/mode": 3, "compress/high_quality": "false", "compress/hdr_compression": 0,
@@ -30,11 +31,13 @@ def write(source: Source, folder: Path) -> Report:
     """Write the strips with their sidecars, the shader, the materials and the scene into a folder."""
     N_h, N_e, N_m = source.grid.shape
     half = source.own_colors("srgb").astype("f2")
-    note = {"axes": warps(source.grid), "space": "linear Rec. 709"}
+    formulas = shader_axes.formulas(source.grid)
+    note = {"axes": formulas, "space": "linear Rec. 709"}
     exr.write(folder / COLOR, [exr.Part("color", exr.rgb(slices(half)), note)], exr.REC709)
     table = lookup.profile_texels(source)
     channels = {name: np.ascontiguousarray(table[..., k].astype("f2")) for k, name in enumerate("RGBA")}
-    exr.write(folder / PROFILE, [exr.Part("profile", channels, {"axes": warps(source.luts.profile_lut.grid)})])
+    profile_note = {"axes": shader_axes.formulas(source.luts.profile_lut.grid)}
+    exr.write(folder / PROFILE, [exr.Part("profile", channels, profile_note)])
     presets = source.presets
     texts = {
         f"{COLOR}.import": sidecar("3d_texture", "CompressedTexture3D",
@@ -45,10 +48,8 @@ def write(source: Source, folder: Path) -> Report:
     }  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    read = trilinear(half.astype(float), source.coordinates(source.skins))
-    error = {"color": difference(read, source.luts.color(*source.skins.T)),
-             "profile": difference(table.astype("f2"), table)}  # fmt: skip
-    axes = "; ".join(code.removeprefix("t = ") for code in warps(source.grid).values())
+    error = {"color": source.color_error(source.grid, half), "profile": difference(table.astype("f2"), table)}
+    axes = "; ".join(formula.removeprefix("t = ") for formula in formulas.values())
     return Report((
         f"{SCENE}: {len(presets)} spheres, one a preset; skin_PRESET.tres: their materials; {SHADER}: the shader.",
         "Drop the folder into a project: Godot 4 imports the strips by their .import files. Give a material to a mesh.",

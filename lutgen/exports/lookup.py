@@ -7,6 +7,7 @@ radius in mm and the encircled energy of red, green and blue: the weight of a ri
 from __future__ import annotations
 
 import re
+import textwrap
 
 import numpy as np
 
@@ -21,16 +22,13 @@ DIALECTS = ("glsl", "gdshader", "hlsl")
 _COLOR = """
 // Diffuse color in linear Rec. 709 of a skin; `lut` is a 3-D texture: x melanin, y eumelanin, z hemoglobin.
 vec3 lutgen_color(sampler3D lut, vec3 skin) {
-    vec3 at = vec3(lutgen_color_melanin(skin.x), lutgen_color_eumelanin(skin.y), lutgen_color_hemoglobin(skin.z));
-    return textureLod(lut, at, 0.0).rgb;
+    return textureLod(lut, lutgen_color_coordinates(skin), 0.0).rgb;
 }
 """
 _RING = """
 // Radius in mm (x) and encircled energy of red, green, blue (yzw) at a quantile of a skin's widest channel.
 vec4 lutgen_ring(sampler2D profile, float quantile, vec3 skin) {
-    vec3 count = vec3(lutgen_profile_COUNT);
-    vec3 at = vec3(lutgen_profile_melanin(skin.x), lutgen_profile_eumelanin(skin.y), lutgen_profile_hemoglobin(skin.z));
-    at = at * count - 0.5;
+    vec3 count = vec3(lutgen_profile_COUNT), at = lutgen_profile_coordinates(skin) * count - 0.5;
     vec3 low = clamp(floor(at), vec3(0.0), max(count - 2.0, vec3(0.0))), along = clamp(at - low, 0.0, 1.0);
     float column = clamp(quantile * QUANTILES - 0.5, 0.0, QUANTILES - 1.0), first = min(floor(column), QUANTILES - 2.0);
     vec4 sum = vec4(0.0);
@@ -49,23 +47,36 @@ vec4 lutgen_ring(sampler2D profile, float quantile, vec3 skin) {
 
 def text(source: Source, dialect: str) -> str:
     """The functions in `glsl` (ES 3), `gdshader` or `hlsl`; `lutgen_color` reads the set's own grid."""
-    grids = ((source.grid, "lutgen_color"), (source.luts.profile_lut.grid, "lutgen_profile"))
-    head = "\n".join(shader_axes.grid_functions(grid, prefix) for grid, prefix in grids)
-    body = (head + "\n" + _COLOR + _RING).replace("QUANTILES", f"{QUANTILES}.0")
-    return _hlsl(body) if dialect == "hlsl" else body
+    color_axes, profile_axes = (
+        shader_axes.grid_functions(grid, prefix, dialect)
+        for grid, prefix in ((source.grid, "lutgen_color"), (source.luts.profile_lut.grid, "lutgen_profile"))
+    )
+    body = (_COLOR + _RING).replace("QUANTILES", f"{QUANTILES}.0")
+    return f"{color_axes}\n{profile_axes}\n" + (_hlsl(body) if dialect == "hlsl" else body)
+
+
+def custom_node(source: Source, name: str) -> str:
+    """The code of an Unreal Custom node that does what the function lutgen_NAME does (`color` or `ring`).
+
+    Its inputs are that function's parameters. The code is pasted into a function: macros and statements, no function.
+    """
+    functions = text(source, "hlsl")
+    body = re.search(rf"^\w+ lutgen_{name}\([^)]*\) \{{\n(.*?)^\}}", functions, re.DOTALL | re.MULTILINE)
+    assert body, name
+    table = "color" if name == "color" else "profile"
+    macros = [line for line in functions.splitlines() if line.startswith(f"#define lutgen_{table}_")]
+    return "\n".join([*macros, textwrap.dedent(body[1])])
 
 
 def _hlsl(body: str) -> str:
-    """HLSL of the same: its types, its names, textures as objects, and counts as macros, which a function may hold too.
+    """HLSL of a text in GLSL: its types, its names, textures as objects.
 
     A texture's sampler is named as Unreal's Custom node names that of an input.
     """
-    body = re.sub(r"const ivec3 (\w+) = ivec3\((.*)\);", r"#define \1 int3(\2)", body)
-    body = re.sub(r"\bi?vec(\d)\b", lambda m: ("int" if m[0][0] == "i" else "float") + m[1], body)
+    body = re.sub(r"\b(i?)vec(\d)\b", lambda m: ("int" if m[1] else "float") + m[2], body)
     body = body.replace("mix(", "lerp(")
-    body = body.replace("sampler3D lut", "Texture3D lut, SamplerState lutSampler").replace(
-        "sampler2D profile", "Texture2D profile"
-    )
+    body = body.replace("sampler3D lut", "Texture3D lut, SamplerState lutSampler")
+    body = body.replace("sampler2D profile", "Texture2D profile")
     body = re.sub(r"textureLod\(lut, (.*), 0\.0\)", r"lut.SampleLevel(lutSampler, \1, 0.0)", body)
     body = re.sub(r"texelFetch\(profile, int2\((.*?), row\), 0\)", r"profile.Load(int3(\1, row, 0))", body)
     return re.sub(r"float(\d)\((-?[\d.]+)\)", lambda m: f"float{m[1]}({', '.join([m[2]] * int(m[1]))})", body)
@@ -81,4 +92,4 @@ def profile_texels(source: Source) -> np.ndarray:
     totals = source.luts.color(*lut.grid.nodes(), space="acescg")
     energy = color.from_acescg(lut.shape * totals[..., None, :], "srgb", source.luts.pipeline)
     shapes, _ = expand.normalized(energy)
-    return profiles.taps(shapes.reshape(-1, *shapes.shape[3:]), lut.radius_edges_mm, QUANTILES)
+    return profiles.taps(shapes.reshape(-1, *shapes.shape[3:]), lut.radius_edges_mm, profiles.even_quantiles(QUANTILES))

@@ -12,7 +12,7 @@ from lutgen.errors import whole
 from lutgen.skin.tissue import PRESETS
 from lutgen.solvers import burley
 from lutgen.tables import expand
-from lutgen.tables.axes import Axis, Grid
+from lutgen.tables.axes import Grid
 from lutgen.tables.lut_set import LutSet
 
 SIZES = (2, 256)
@@ -87,12 +87,17 @@ class Source:
         """1,000 random skins [1000, 3] (melanin, eumelanin, hemoglobin), even in the axes' warps; fixed seed."""
         t = np.random.default_rng(0).random((POINTS, 3))
         axes = (getattr(self.grid, name) for name in AXES)
-        return np.stack([unwarped(axis, t[:, k]) for k, axis in enumerate(axes)], axis=1)
+        return np.stack([axis.unwarp(t[:, k]) for k, axis in enumerate(axes)], axis=1)
 
     def coordinates(self, skins: np.ndarray) -> np.ndarray:
         """Warped coordinates in 0 to 1 [N, 3] of skins [N, 3]: what a cube's input R, G, B are."""
         axes = [getattr(self.grid, name) for name in AXES]
-        return np.stack([warped(axis, skins[:, k]) for k, axis in enumerate(axes)], axis=1)
+        return np.stack([axis.warp(skins[:, k]) for k, axis in enumerate(axes)], axis=1)
+
+    def color_error(self, grid: Grid, cells: np.ndarray, space: str = "srgb") -> dict:
+        """What a reader of cells [N_h, N_e, N_m, 3] over a grid gets at the random skins against the set's colors."""
+        read = grid.interpolate(cells.astype(float), *self.skins.T)
+        return difference(read, self.luts.color(*self.skins.T, space=space))
 
     @cached_property
     def presets(self) -> list[Preset]:
@@ -121,50 +126,7 @@ def nested_size(luts: LutSet) -> int:
     return next((n for n in (2 * most - 1, most) if SIZES[0] <= n <= 64), max(most, SIZES[0]))
 
 
-def warped(axis: Axis, value) -> np.ndarray:
-    """Position in 0 to 1 along an axis after its warp; 0 for a fixed parameter."""
-    return axis.position(value) / max(axis.count - 1, 1)
-
-
-def unwarped(axis: Axis, t: np.ndarray) -> np.ndarray:
-    """The value at a position in 0 to 1 along an axis."""
-    if axis.count == 1:
-        return np.full(t.shape, axis.low)
-    p = axis.exponent
-    a, b = np.log([axis.low, axis.high]) if p == 0 else np.array([axis.low, axis.high]) ** p
-    even = a + (b - a) * t
-    return np.clip(np.exp(even) if p == 0 else even ** (1 / p), axis.low, axis.high)
-
-
-def trilinear(cells: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
-    """What a consumer reads [N, C] from cells [D, H, W, C] at warped coordinates [N, 3]: (x, y, z)."""
-    out = np.zeros((len(coordinates), cells.shape[-1]))
-    position = coordinates[:, ::-1] * (np.array(cells.shape[:3]) - 1)
-    low = np.minimum(position.astype(int), np.maximum(np.array(cells.shape[:3]) - 2, 0))
-    along = position - low
-    for corner in np.ndindex(2, 2, 2):
-        weight = np.prod(np.where(corner, along, 1 - along), axis=1)
-        at = np.minimum(low + corner, np.array(cells.shape[:3]) - 1)
-        out += weight[:, None] * cells[tuple(at.T)]
-    return out
-
-
-def difference(found: np.ndarray, expected: np.ndarray) -> dict:
+def difference(values: np.ndarray, expected: np.ndarray) -> dict:
     """Largest and mean absolute difference of two arrays, as plain values."""
-    off = np.abs(np.asarray(found, float) - expected)
+    off = np.abs(np.asarray(values, float) - expected)
     return {"largest": float(off.max()), "mean": float(off.mean())}
-
-
-def warps(grid: Grid) -> dict[str, str]:
-    """The warp of each axis as code: its coordinate t in 0 to 1 from a value."""
-    found = {}
-    for name in AXES:
-        axis = getattr(grid, name)
-        p = axis.exponent
-        if axis.count == 1:
-            found[name] = f"t = 0.5 ({name} is {axis.low:.9g} throughout)"
-            continue
-        value = f"log({name})" if p == 0 else name if p == 1 else f"pow({name}, {p:.9g})"
-        a, b = (float(np.log(v) if p == 0 else v**p) for v in (axis.low, axis.high))
-        found[name] = f"t = ({value} - {a:.9g}) / {b - a:.9g}"
-    return found

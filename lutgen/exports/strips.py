@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.exports.resampled import MADE, MEANING, Report, Source, difference, trilinear, warps
+from lutgen.exports.resampled import MADE, MEANING, Report, Source
 from lutgen.files import exr
+from lutgen.tables import shader_axes
 
 FILES = {"color_rec709.exr": "srgb", "color_acescg.exr": "acescg"}
 CHROMATICITIES = {"srgb": exr.REC709, "acescg": exr.ACESCG}
@@ -20,20 +21,20 @@ def strip(cells: np.ndarray) -> np.ndarray:
 
 def write(source: Source, folder: Path) -> Report:
     """Write both strips into a folder, rows of low hemoglobin first in the file."""
-    error = {}
+    error, axes = {}, shader_axes.formulas(source.grid)
     for name, space in FILES.items():
         half = source.own_colors(space).astype("f2")
-        part = exr.Part("color", exr.rgb(strip(half)), {"axes": warps(source.grid), "space": space})
+        note = {"axes": axes, "space": space}
+        part = exr.Part("color", exr.rgb(strip(half)), note)
         exr.write(folder / name, [part], CHROMATICITIES[space])
-        read = trilinear(half.astype(float), source.coordinates(source.skins))
-        error[name] = difference(read, source.luts.color(*source.skins.T, space=space))
+        error[name] = source.color_error(source.grid, half, space)
     N_h, N_e, N_m = source.grid.shape
-    largest = max(one["largest"] for one in error.values())
+    largest = max(off["largest"] for off in error.values())
     return Report((
         f"{', '.join(FILES)}: skin color as strips of {N_e * N_m} x {N_h} texels, half float, ZIP, unclipped.",
         f"x: melanin, {N_m} texels a tile; {N_e} tiles along eumelanin. y: hemoglobin, row 0 is the lowest.",
         "Space: linear Rec. 709 (D65), or linear ACEScg (ACES white, adapted from D65 by CAT02).",
-        f"Axis warp to t in 0 to 1: {'; '.join(warps(source.grid).values())}.",
+        f"Axis warp to t in 0 to 1: {'; '.join(axes.values())}.",
         f"Half texel: u = (t * {N_m - 1} + 0.5) / {N_m} in a tile, v = (t * {N_h - 1} + 0.5) / {N_h}. Mix two",
         "tiles by eumelanin and keep u within its tile, or filtering bleeds into the neighbor.",
         *MEANING,

@@ -16,10 +16,10 @@ from PIL import Image
 from lutgen.color import encode_srgb
 from lutgen.exports import lookup
 from lutgen.exports.ktx2 import UNSPECIFIED, ktx2
-from lutgen.exports.resampled import AXES, ENTRY, MADE, MEANING, Report, Source, difference, trilinear, warps
+from lutgen.exports.resampled import ENTRY, MADE, MEANING, Report, Source, difference
 from lutgen.files import texture_maps
 from lutgen.head import builtin, paint
-from lutgen.tables.axes import Axis
+from lutgen.tables import shader_axes
 
 COLOR, PROFILE, CHUNK, PAGE = "skin_color.ktx2", "skin_profile.ktx2", "skin.glsl", "skin.html"
 _PRECISION = "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\nprecision highp sampler3D;\n"
@@ -43,7 +43,8 @@ def write(source: Source, folder: Path) -> Report:
     color = _color(source)
     table = lookup.profile_texels(source)
     profile = table.astype("f2")
-    notes = {"KTXwriter": f"lutgen {version('lutgen')}", "lutgen.axes": json.dumps(warps(source.grid))}
+    formulas = shader_axes.formulas(source.grid)
+    notes = {"KTXwriter": f"lutgen {version('lutgen')}", "lutgen.axes": json.dumps(formulas)}
     written = {
         COLOR: ktx2(color, notes | {"lutgen.space": "linear Rec. 709; x melanin, y eumelanin, z hemoglobin"}),
         PROFILE: ktx2(
@@ -55,11 +56,10 @@ def write(source: Source, folder: Path) -> Report:
         (folder / name).write_bytes(content)
     (folder / PAGE).write_text(page(source, written), encoding="utf-8")
 
-    read = trilinear(color[..., :3].astype(float), source.coordinates(source.skins))
-    error = {"color": difference(read, source.luts.color(*source.skins.T)), "profile": difference(profile, table)}
+    error = {"color": source.color_error(source.grid, color[..., :3]), "profile": difference(profile, table)}
     N_h, N_e, N_m = source.grid.shape
     counts = source.luts.profile_lut.grid.shape[::-1]
-    axes = "; ".join(code.removeprefix("t = ") for code in warps(source.grid).values())
+    axes = "; ".join(formula.removeprefix("t = ") for formula in formulas.values())
     return Report((
         f"{COLOR}: 3-D, {N_m} x {N_e} x {N_h}, RGBA half. {PROFILE}: 2-D. {CHUNK}: GLSL that reads both.",
         f"{PAGE}: all of it in one page, with sliders, in plain WebGL2; open it from the disk, it needs no network.",
@@ -88,27 +88,25 @@ def page(source: Source, written: dict[str, bytes]) -> str:
     painted = paint.paint(shape)
     arrays, facts = _mesh(shape, painted["surface"][..., 2])
     packed = {COLOR: written[COLOR], PROFILE: written[PROFILE], **arrays}
+    constants = f"const float ENTRY = {ENTRY:.9g};\nconst int QUANTILES = {lookup.QUANTILES};"
     data = {
         "packed": {name: _text(zlib.compress(content, 9)) for name, content in packed.items()},
         "pictures": {"pigments": _text(_pigments(painted)), "bumps": _text(_jpeg(painted["normal"][::2, ::2, :3]))},
-        "mesh": facts, "axes": {name: _axis(getattr(source.grid, name)) for name in AXES},
+        "mesh": facts, "quantiles": lookup.QUANTILES,
         "presets": {preset.name: preset.skin for preset in source.presets},
         "swatches": {preset.name: _eight_bit(preset.linear_srgb) for preset in source.presets},
         "shaders": {name: template.joinpath(f"{name}.glsl").read_text(encoding="utf-8") for name in SHADERS},
-        "chunk": written[CHUNK].decode() + f"\nconst float ENTRY = {ENTRY:.9g};\n",
+        "chunk": written[CHUNK].decode() + f"\n{constants}\n",
     }  # fmt: skip
     text = template.joinpath("page.html").read_text(encoding="utf-8")
     script = "\n".join(template.joinpath(name).read_text(encoding="utf-8") for name in ("gl.js", "page.js"))
     safe = json.dumps(data).replace("</", "<\\/")  # else a text in it could end the script element
-    return text.replace("/*SCRIPT*/", script).replace('"DATA"', safe)
+    script = script.replace('"AXES"', shader_axes.javascript(source.grid)).replace('"DATA"', safe)
+    return text.replace("/*SCRIPT*/", script)
 
 
 def _eight_bit(linear_srgb: np.ndarray) -> list[int]:
     return np.round(255 * encode_srgb(np.clip(linear_srgb, 0, 1))).astype(int).tolist()
-
-
-def _axis(axis: Axis) -> dict:
-    return {"low": axis.low, "high": axis.high, "exponent": axis.exponent}
 
 
 def _mesh(shape, open_sky: np.ndarray) -> tuple[dict[str, bytes], dict]:

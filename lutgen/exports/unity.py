@@ -17,8 +17,9 @@ import numpy as np
 
 from lutgen.errors import InputError
 from lutgen.exports import cube, engine_textures, lookup
-from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source, warps
+from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source
 from lutgen.files import exr
+from lutgen.tables import shader_axes
 
 COLOR, PROFILE, CUBE = "lutgen_color.exr", "lutgen_profile.exr", "lutgen_color.cube"
 IMPORTER = "Editor/LutgenImporter.cs"
@@ -62,7 +63,8 @@ def write(source: Source, folder: Path) -> Report:
     half = source.own_colors("srgb").astype("f2")
     flipbook = engine_textures.fits("unity", "color", engine_textures.slices(half))
     texels = engine_textures.fits("unity", "profile", lookup.profile_texels(source).astype("f4"))
-    notes = {"axes": warps(source.grid), "space": "linear Rec. 709"}
+    axes = shader_axes.formulas(source.grid)
+    notes = {"axes": axes, "space": "linear Rec. 709"}
     exr.write(folder / COLOR, [exr.Part("color", exr.rgb(flipbook[::-1]), notes)], exr.REC709)
     exr.write(folder / PROFILE, [exr.Part("profile", engine_textures.rgba(texels[::-1]), {})], exr.REC709)
     text, values = cube.text(source, "lutgen skin")
@@ -95,7 +97,7 @@ def write(source: Source, folder: Path) -> Report:
         "quantile; R is a radius in mm, G B A the share of red, green, blue light within it.",
         f"{CUBE}: {source.size} nodes an axis, clipped to 0 to 1; R G B = melanin, eumelanin, hemoglobin after the "
         f"warp. lutgen.hlsl is for the textures; its Lutgen*_float for Shader Graph's Custom Function (File).",
-        f"Axis warp: {'; '.join(warps(source.grid).values())}; half texel: u = (t * (n - 1) + 0.5) / n; both are in "
+        f"Axis warp: {'; '.join(axes.values())}; half texel: u = (t * (n - 1) + 0.5) / n; both are in "
         "lutgen.hlsl.",
         "Diffusion Profile: scattering color * multiplier = D in mm of the closest Burley shape, 1 unit = 1 m, IOR 1.4;"
         f" filter radius {FILTER_RADIUS} D; 20, 40 or 80 samples by quality; at most {PROFILES} profiles in a scene.",

@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from lutgen.exports import engine_textures, lookup
-from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source, warps
+from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source
 from lutgen.files import exr
+from lutgen.tables import shader_axes
 
 COLOR, PROFILE = "T_LutgenColor.exr", "T_LutgenProfile.exr"
 LEAST = 0.009
@@ -63,14 +64,13 @@ def write(source: Source, folder: Path) -> Report:
     half = source.own_colors("srgb").astype("f2")
     strip = engine_textures.fits("unreal", "color", engine_textures.slices(half))
     texels = engine_textures.fits("unreal", "profile", lookup.profile_texels(source).astype("f4"))
-    notes = {"axes": warps(source.grid), "space": "linear Rec. 709"}
+    axes = shader_axes.formulas(source.grid)
+    notes = {"axes": axes, "space": "linear Rec. 709"}
     exr.write(folder / COLOR, [exr.Part("color", exr.rgb(strip), notes)], exr.REC709)
     exr.write(folder / PROFILE, [exr.Part("profile", engine_textures.rgba(texels), {})], exr.REC709)
     (folder / "lutgen.ush").write_text(engine_textures.hlsl(source, _NOTE), encoding="ascii")
-    functions = lookup.text(source, "hlsl").strip()
     for name in ("color", "ring"):
-        code = engine_textures.custom_node(functions, f"lutgen_{name}")
-        (folder / f"custom_node_{name}.hlsl").write_text(code, encoding="ascii")
+        (folder / f"custom_node_{name}.hlsl").write_text(lookup.custom_node(source, name), encoding="ascii")
     (folder / "import_lutgen.py").write_text(engine_textures.template("import_lutgen.py.txt"), encoding="ascii")
     N_h, N_e, N_m = source.grid.shape
     values = {
@@ -89,7 +89,7 @@ def write(source: Source, folder: Path) -> Report:
         "is a radius in mm, G B A the share of red, green, blue light within it.",
         "custom_node_*.hlsl: code of Custom nodes: inputs lut, skin (float3 out) or profile, quantile, skin (float4);"
         " or lutgen.ush in PROJECT/Shaders, included as /Project/lutgen.ush. Skin: melanin, eumelanin, hemoglobin.",
-        f"Axis warp: {'; '.join(warps(source.grid).values())}; half texel: u = (t * (n - 1) + 0.5) / n; both in the "
+        f"Axis warp: {'; '.join(axes.values())}; half texel: u = (t * (n - 1) + 0.5) / n; both in the "
         "HLSL.",
         "Subsurface Profile: color * distance * world unit scale = 0.6 (1.85 - A + 7 |A - 0.8|^3) d in cm, A the color,"
         " d the closest Burley shape's; mean free path must stay enabled; IOR 1.4 (the engine's own is 1.55).",

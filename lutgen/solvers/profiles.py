@@ -69,16 +69,25 @@ class Profile:
         return np.array([np.interp(share, p, self.radius_edges_mm) for p in columns]).reshape(self.energy.shape[1:])
 
 
-def taps(shapes: np.ndarray, radius_edges_mm: np.ndarray, count: int = 64) -> np.ndarray:
-    """What a gather samples, [N, count, 4], of normalized profiles [N, B, 3]: radius in mm and P_R, P_G, P_B there.
+def even_quantiles(count: int = 64) -> np.ndarray:
+    """Quantiles [count], each in the middle of an equal share.
 
-    Radii are the quantiles (i + 0.5) / count of the node's widest channel (largest r90); P is encircled energy. Each
-    ring spreads its energy evenly in radius.
+    >>> even_quantiles(4).tolist()
+    [0.125, 0.375, 0.625, 0.875]
+    """
+    return (np.arange(count) + 0.5) / count
+
+
+def taps(shapes: np.ndarray, radius_edges_mm: np.ndarray, quantiles: np.ndarray | None = None) -> np.ndarray:
+    """What a gather samples, [N, Q, 4], of normalized profiles [N, B, 3]: radius in mm and P_R, P_G, P_B there.
+
+    Radii are `quantiles` [Q] of the node's widest channel (largest r90), or the 64 of `even_quantiles`; P is encircled
+    energy. Each ring spreads its energy evenly in radius.
     """
     P = np.moveaxis(encircled(np.moveaxis(shapes, 1, -1)), 1, -1)  # [N, B + 1, 3]
     r90 = inverse(P.transpose(0, 2, 1), radius_edges_mm, np.array([0.9]))[..., 0]
     widest = np.take_along_axis(P, r90.argmax(axis=1)[:, None, None], axis=2)[:, :, 0]
-    radius = inverse(widest, radius_edges_mm, (np.arange(count) + 0.5) / count)
+    radius = inverse(widest, radius_edges_mm, even_quantiles() if quantiles is None else quantiles)
     ring = np.clip(np.searchsorted(radius_edges_mm, radius, side="right") - 1, 0, len(radius_edges_mm) - 2)
     along = (radius - radius_edges_mm[ring]) / np.diff(radius_edges_mm)[ring]
     low, high = (np.take_along_axis(P, (ring + i)[..., None], axis=1) for i in (0, 1))

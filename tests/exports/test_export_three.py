@@ -12,7 +12,7 @@ from PIL import Image
 from lutgen import color
 from lutgen.cli import main
 from lutgen.exports import lookup
-from lutgen.exports import resampled as sources
+from lutgen.tables import shader_axes
 
 HALF = 2.0**-11
 """Largest relative rounding of a half float."""
@@ -39,7 +39,7 @@ def test_ktx_parse_reads_both_textures(folder, source):
         assert (file["typeSize"], file["layerCount"], file["faceCount"], file["supercompressionScheme"]) == (2, 0, 1, 0)
         assert len(file["pixels"]) == 1
         assert file["keyValue"]["KTXwriter"].startswith("lutgen ")
-        assert json.loads(file["keyValue"]["lutgen.axes"]) == sources.warps(source.grid)
+        assert json.loads(file["keyValue"]["lutgen.axes"]) == shader_axes.formulas(source.grid)
         (block,) = file["descriptor"]
         assert (block["vendorId"], block["descriptorType"], block["versionNumber"]) == (0, 0, 2)
         assert (block["colorModel"], block["colorPrimaries"], block["transferFunction"]) == (1, primaries, 1)
@@ -100,7 +100,7 @@ def test_three_js_samples_what_the_luts_say(read, source):
     for name in ("color", "strip"):
         assert np.all(np.abs(values(read, name)[:, :3] - exact) <= HALF * exact + 1e-6), name
     cells = np.clip(source.colors("srgb"), 0, 1)
-    cube = sources.trilinear(cells, source.coordinates(source.skins))
+    cube = source.cubic.interpolate(cells, *source.skins.T)
     assert values(read, "cube")[:, :3] == pytest.approx(cube, abs=1e-6)
     assert values(read, "cube")[:, :3] == pytest.approx(exact, abs=2e-4)
 

@@ -39,7 +39,7 @@ vec3 gathered(ivec2 pixel, vec4 here, vec4 place, int count) {
 
     float own = 0.56 / pixels_per_mm;
     vec3 inner = encircled(own, place).rgb;
-    if (own < exp(LOG_RADIUS_LOW)) inner *= own * own / exp(2.0 * LOG_RADIUS_LOW);
+    if (own < LEAST_RADIUS_MM) inner *= own * own / (LEAST_RADIUS_MM * LEAST_RADIUS_MM);
     float first = min(inner.r, min(inner.g, inner.b));  // the widest channel has the least within the pixel
 
     float phase = bayer(pixel), turn = 6.2831853 * fract(phase + float(frame) * 0.75488);

@@ -14,22 +14,22 @@ const int TAPS = 16;
 const mat2 GOLDEN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
 
 vec4 ring(float quantile) {
-    float column = clamp(quantile * 64.0 - 0.5, 0.0, 63.0);
-    int first = int(min(floor(column), 62.0));
+    float column = clamp(quantile * float(QUANTILES) - 0.5, 0.0, float(QUANTILES - 1));
+    int first = min(int(column), QUANTILES - 2);
     return mix(texelFetch(row, ivec2(first, 0), 0), texelFetch(row, ivec2(first + 1, 0), 0), column - float(first));
 }
 
 // Encircled energies within a radius in mm (rgb), and the quantile there (a); within the first column's, by area.
 vec4 within(float radius) {
-    int low = 0, high = 63;
-    for (int i = 0; i < 6; i++) {
+    int low = 0, high = QUANTILES - 1;
+    while (high - low > 1) {
         int half_way = (low + high) / 2;
         if (texelFetch(row, ivec2(half_way, 0), 0).x < radius) low = half_way; else high = half_way;
     }
     vec4 a = texelFetch(row, ivec2(low, 0), 0), b = texelFetch(row, ivec2(high, 0), 0);
-    if (radius < a.x) return vec4(a.yzw, 0.5 / 64.0) * radius * radius / (a.x * a.x);
+    if (radius < a.x) return vec4(a.yzw, 0.5 / float(QUANTILES)) * radius * radius / (a.x * a.x);
     float along = clamp((radius - a.x) / max(b.x - a.x, 1e-6), 0.0, 1.0);
-    return vec4(mix(a.yzw, b.yzw, along), (float(low) + 0.5 + along) / 64.0);
+    return vec4(mix(a.yzw, b.yzw, along), (float(low) + 0.5 + along) / float(QUANTILES));
 }
 
 float noise(ivec2 p, float seed) {

@@ -6,15 +6,9 @@ const $ = (query) => document.querySelector(query);
 const canvas = $("canvas");
 const state = { skin: [0, 0, 0], turn: 0.36, tilt: 0.03, far: 965, frame: 0 };
 
-// The axes: position t in 0 to 1 to a value and back, as the README's warps have it.
-const warp = (axis, value) => axis.exponent === 0 ? Math.log(value) : value ** axis.exponent;
-const valueAt = (axis, t) => {
-  const low = warp(axis, axis.low), at = low + (warp(axis, axis.high) - low) * t;
-  const value = axis.exponent === 0 ? Math.exp(at) : at ** (1 / axis.exponent);
-  return Math.min(axis.high, Math.max(axis.low, value));
-};
-const placeOf = (axis, value) => axis.low === axis.high ? 0.5
-  : (warp(axis, value) - warp(axis, axis.low)) / (warp(axis, axis.high) - warp(axis, axis.low));
+// The axes: a slider stands at t in 0 to 1, the warp of its value.
+const axes = Object.entries("AXES");
+const valueAt = (axis, t) => Math.min(axis.high, Math.max(axis.low, axis.unwarp(t)));
 
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const unpacked = async (name) => {
@@ -76,7 +70,7 @@ async function start() {
   };
   const color = ktx2(gl, await unpacked("skin_color.ktx2")), profile = ktx2(gl, await unpacked("skin_profile.ktx2"));
   const [pigments, bumps] = [await picture(gl, "pigments"), await picture(gl, "bumps")], head = await mesh(gl);
-  const row = target(gl, 64, 1, 1), shadow = target(gl, SHADOW, SHADOW, 0, depths(gl, SHADOW, SHADOW));
+  const row = target(gl, data.quantiles, 1, 1), shadow = target(gl, SHADOW, SHADOW, 0, depths(gl, SHADOW, SHADOW));
   gl.bindTexture(gl.TEXTURE_2D, shadow.depth);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_COMPARE_MODE, gl.COMPARE_REF_TO_TEXTURE);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_COMPARE_FUNC, gl.LEQUAL);
@@ -162,7 +156,6 @@ async function start() {
 }
 
 function controls(redraw) {
-  const axes = Object.entries(data.axes);
   const sliders = axes.map(([name, axis], k) => {
     const label = document.createElement("label"), shown = document.createElement("output"), slider = document.createElement("input");
     Object.assign(slider, { type: "range", min: 0, max: 1, step: "any", id: name, disabled: axis.low === axis.high });
@@ -183,8 +176,8 @@ function controls(redraw) {
   });
   function changed() {
     axes.forEach(([, axis], k) => {
-      const place = placeOf(axis, state.skin[k]);
-      if (Math.abs(place - Number(sliders[k].slider.value)) > 1e-9) sliders[k].slider.value = place;
+      const t = axis.warp(state.skin[k]);
+      if (Math.abs(t - Number(sliders[k].slider.value)) > 1e-6) sliders[k].slider.value = t;
       sliders[k].shown.textContent = (100 * state.skin[k]).toPrecision(3) + " %";
       sliders[k].shown.dataset.value = state.skin[k];
     });

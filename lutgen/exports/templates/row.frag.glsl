@@ -3,4 +3,4 @@ uniform sampler2D profile;
 uniform vec3 skin;
 out vec4 ring;
 
-void main() { ring = lutgen_ring(profile, gl_FragCoord.x / 64.0, skin); }
+void main() { ring = lutgen_ring(profile, gl_FragCoord.x / float(QUANTILES), skin); }
