@@ -1,4 +1,4 @@
-"""The source document's results as charts and tables."""
+"""The results of Zhang, Human face rendering, as charts and tables."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ COMMANDS = {
     "check": "verify a LUT set: files, axes, laws, 100 nodes against adding-doubling",
     "devices": "the OpenCL devices, best first",
     "bench": "speed of the trace, and time and error of a bake by stage",
-    "figures": "the source document's results as charts and tables",
+    "figures": "the results of Zhang, Human face rendering, as charts and tables",
     "chart": "speed against accuracy of every method and setting, as charts",
     "stability": "where each method errs beyond its promise, as maps and a table",
     "view": "a window with a face shaded from a LUT set, or a picture of it",

@@ -26,7 +26,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--pipeline", choices=color.PIPELINES, default="default",
-        help="from a spectrum to a color: this package's, or the source document's (default: %(default)s)",
+        help="to a color by this package's way, or that of Zhang, Human face rendering (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument(
         "--method", choices=solvers.METHODS, default="adding-doubling", help="solver (default: %(default)s)"

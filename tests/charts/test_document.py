@@ -1,4 +1,4 @@
-"""`lutgen figures`: exact colors of the document's results, in files that are whole, repeatable and alike."""
+"""`lutgen figures`: exact colors of the results of Zhang, Human face rendering: files whole, repeatable and alike."""
 
 import csv
 import sys

@@ -1,4 +1,4 @@
-"""The source document's results again, each linear and exponential, in its color pipeline and in the default one."""
+"""The results of Zhang, Human face rendering: linear and exponential, in its color pipeline and in the default."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The source document's three skin types as rendered heads, by samples, without and with textures."""
+"""The three skin types of Zhang, Human face rendering, as rendered heads, by samples, without and with textures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""What the document's `mixed` absorption costs: its bias against mu_a / mu_t, beside closed forms, and on the presets.
+"""What `mixed` absorption costs: its bias against mu_a / mu_t, beside closed forms, and on the presets.
+
+It is that of Zhang, Human face rendering (kernels/README.md, Three ways to absorb).
 
 With steps s drawn from mu_t, one event keeps exp(-mu_a s) of the weight, 1 / (1 + a) in the mean for a = mu_a / mu_t,
 where it should keep 1 - a. So `mixed` solves a medium of albedo 1 / (1 + a) exactly. For isotropic scattering without
