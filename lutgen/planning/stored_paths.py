@@ -28,9 +28,7 @@ def edges() -> np.ndarray:
     >>> edges()[[0, 1, -1]].tolist()
     [0.0, 0.0005, 30.0]
     """
-    found = np.concatenate([[0.0], np.geomspace(FIRST_MM, LAST_MM, RINGS)])
-    found[1], found[-1] = FIRST_MM, LAST_MM
-    return found
+    return profiles.ring_edges(RINGS, FIRST_MM, LAST_MM)
 
 
 def part(paths: PathTable, attributes: dict) -> exr.Part:
@@ -97,7 +95,7 @@ def within(radius_edges_mm: np.ndarray, radius_mm: np.ndarray) -> np.ndarray:
 
 def in_rings(radius_mm: np.ndarray, rings: int) -> np.ndarray:
     """Matrix [R, RINGS + 1]: encircled energy at radii as a LUT of that many rings tells it, linear within each."""
-    coarse = np.minimum(profiles.default_edges(rings), edges()[-1])
+    coarse = np.minimum(profiles.ring_edges(rings), edges()[-1])
     at_edges = within(edges(), coarse)
     ring = np.clip(np.searchsorted(coarse, radius_mm, side="right") - 1, 0, rings - 1)
     along = ((radius_mm - coarse[ring]) / np.diff(coarse)[ring])[:, None]

@@ -61,7 +61,7 @@ class Truth:
 
 def reference(photons: int, device: str | None = None) -> PathTable:
     """A trace of the default skin that knows nothing of the stored paths, fine in radius."""
-    edges = np.concatenate([[0.0], np.geomspace(stored_paths.FIRST_MM, stored_paths.LAST_MM, REFERENCE_RINGS)])
+    edges = profiles.ring_edges(REFERENCE_RINGS, stored_paths.FIRST_MM, stored_paths.LAST_MM)
     return bake.paths_at_every_wavelength(photons, edges, REFERENCE_SEED, Recipe().skin, ocl.choose(device))
 
 

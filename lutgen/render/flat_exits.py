@@ -15,7 +15,7 @@ import numpy as np
 from lutgen import device as ocl
 from lutgen.errors import MachineError
 from lutgen.skin.tissue import Skin
-from lutgen.solvers import path_table
+from lutgen.solvers import path_table, profiles
 from lutgen.solvers.paths import PHOTONS
 from lutgen.tables import bake, expand
 from lutgen.tables.lut_set import LutSet
@@ -85,11 +85,6 @@ class Exits:
         return out / self.photons
 
 
-def edges_mm(rings: int = RINGS) -> np.ndarray:
-    """Ring edges: a first disc of 0.1 um, the rest even in logarithm to 60 mm."""
-    return np.concatenate([[0.0], np.geomspace(1e-4, 60.0, rings)])
-
-
 def entry_cosines(n: float, angles: int = ANGLES) -> np.ndarray:
     """Cosines inside the skin [angles] from grazing light to light along the normal."""
     return np.linspace(np.sqrt(1 - 1 / n**2), 1.0, angles)
@@ -105,7 +100,7 @@ def trace(
     """
     facts = luts.manifest["recipe"]["skin"]
     medium, _ = bake.skin_medium(Skin(0.02, 0.7, 0.01, **facts), luts.paths.wavelength_nm)
-    edges = edges_mm() if edges is None else edges
+    edges = profiles.ring_edges(RINGS, last_mm=60.0) if edges is None else edges
     cosines = entry_cosines(medium.n, angles)
     tally = path_table.Tally()
     K, C = len(luts.weights), (len(edges) - 1) * SECTORS

@@ -10,7 +10,7 @@ import numpy as np
 from lutgen.errors import InputError, numbers, one_of, shown, whole
 from lutgen.skin.tissue import Layer, Skin, layers
 from lutgen.solvers.paths import PHOTONS, SEEDS
-from lutgen.solvers.profiles import Profile, default_edges
+from lutgen.solvers.profiles import Profile, ring_edges
 
 METHODS = {
     "path-table": "path_table",
@@ -66,7 +66,7 @@ def profile(
     >>> profile.energy.shape
     (64,)
     """
-    edges = default_edges() if radius_edges_mm is None else numbers("radius_edges_mm", radius_edges_mm)
+    edges = ring_edges() if radius_edges_mm is None else numbers("radius_edges_mm", radius_edges_mm)
     if edges.ndim != 1 or len(edges) < 2 or not edges[0] >= 0 or not np.all(np.diff(edges) > 0):
         raise InputError(
             f"radius_edges_mm = {shown(radius_edges_mm)}: at least two ascending radii of 0 or more are needed"

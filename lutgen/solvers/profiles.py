@@ -10,14 +10,14 @@ COMPARED_FROM_MM = 0.01
 """Profiles are compared from this radius on: what leaves nearer looks like a surface reflection."""
 
 
-def default_edges(rings: int = 64) -> np.ndarray:
-    """Ring edges in mm: a first ring of 0.1 um (a dark skin's blue r10 is 1 um), the rest even in log to 30 mm.
+def ring_edges(rings: int = 64, first_mm: float = 1e-4, last_mm: float = 30.0) -> np.ndarray:
+    """Ring edges in mm: a disc of 0.1 um (a dark skin's blue r10 is 1 um), rings even in logarithm around it to 30 mm.
 
-    >>> default_edges()[[0, 1, -1]].tolist()
+    >>> ring_edges()[[0, 1, -1]].tolist()
     [0.0, 0.0001, 30.0]
     """
-    edges = np.concatenate([[0.0], np.geomspace(1e-4, 30.0, rings)])
-    edges[1], edges[-1] = 1e-4, 30.0
+    edges = np.concatenate([[0.0], np.geomspace(first_mm, last_mm, rings)])
+    edges[1], edges[-1] = first_mm, last_mm
     return edges
 
 

@@ -49,7 +49,7 @@ def bake(
     chosen = ocl.choose(device)
 
     clock.stage("trace")
-    nm, edges = rule.wavelength_nm, profiles.default_edges(recipe.rings)
+    nm, edges = rule.wavelength_nm, profiles.ring_edges(recipe.rings)
     medium, reach = skin_medium(recipe.skin, nm)
     paths = path_table.trace(
         medium, *reach, edges, recipe.photons, recipe.seed, chosen, blocks_per_launch, clock.launched

@@ -17,7 +17,7 @@ from lutgen.skin.tissue import layers, preset
 from lutgen.solvers import dipole, direct, multipole, path_table, profiles
 from lutgen.tables import wavelengths
 
-EDGES = profiles.default_edges()
+EDGES = profiles.ring_edges()
 CHANNELS = ("ee_red", "ee_green", "ee_blue")
 KOLMOGOROV_SPREAD = 0.2603 / 0.8687
 """Standard deviation over mean of the largest difference of an empirical distribution from its own (Kolmogorov)."""

@@ -12,7 +12,7 @@ from lutgen.solvers import profiles
 from lutgen.solvers.paths import interpolation_matrix
 from lutgen.tables import expand, wavelengths
 
-EDGES = profiles.default_edges()
+EDGES = profiles.ring_edges()
 NAMES = ("wavelengths", "axes", "profile-axes")
 SKINS = (np.array([0.0127, 0.0734, 0.43]), np.array([0.7, 0.2, 0.7]), np.array([0.0077, 0.05, 0.005]))
 

@@ -83,7 +83,7 @@ def test_radii_are_read_exactly_at_ring_edges_and_linearly_within_coarse_rings()
     assert stored_paths.within(edges, middle) @ P == pytest.approx(1 - np.exp(-((middle / 0.3) ** 0.7)), abs=1e-4)
     radii = np.geomspace(0.01, 20, 50)
     for rings in (16, 64):
-        coarse = profiles.default_edges(rings)
+        coarse = profiles.ring_edges(rings)
         told = np.interp(radii, coarse, 1 - np.exp(-((coarse / 0.3) ** 0.7)))
         assert stored_paths.in_rings(radii, rings) @ P == pytest.approx(told, abs=5e-4)
 

@@ -70,7 +70,7 @@ def test_channels_are_fitted_one_by_one():
 def test_skin_is_not_burleys_shape():
     """.02 to .06 for skin tones per channel (lutgen/solvers/README.md, Burley); here at single wavelengths, and the
     mean radius is worse."""
-    edges = profiles.default_edges()
+    edges = profiles.ring_edges()
     for nm in (450.0, 550.0, 650.0):
         traced = path_table.profile(lutgen.layers(lutgen.preset("light"), nm), edges, photons=100_000)
         d, difference = burley.fit(traced.energy, edges)

@@ -198,7 +198,7 @@ layer_values = st.tuples(st.floats(0, 20), st.floats(0.01, 60), st.floats(-0.5, 
 def test_no_energy_is_negative_lost_or_nan(first, second, n):
     """Anywhere, with unsafe; rings sum to the total."""
     pair = [Layer(t, a, s, g, n) for t, (a, s, g, _) in ((first[3], first), (INF, second))]
-    edges = np.concatenate([profiles.default_edges(24), [INF]])
+    edges = np.concatenate([profiles.ring_edges(24), [INF]])
     for solver, layers in ((multipole, pair), (dipole, pair[1:])):
         result, found = solver.reflectance(layers, unsafe=True), solver.profile(layers, edges, unsafe=True)
         assert 0 <= result.diffuse <= 1 - result.specular + 1e-12

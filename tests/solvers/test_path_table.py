@@ -18,7 +18,7 @@ from lutgen.tables.axes import default_grid
 
 NM = np.array([420.0, 540.0, 660.0])
 SKIN = tissue.preset("light")
-EDGES = profiles.default_edges()
+EDGES = profiles.ring_edges()
 
 
 def trace(photons=32_768, seed=0, nm=NM, **options):

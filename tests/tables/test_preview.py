@@ -31,7 +31,7 @@ NO_PATHS = PathTable(*(np.empty(0) for _ in range(6)), photons=1, entry=1.0)  # 
 
 def luts_over(grid: Grid, cells: np.ndarray, **manifest) -> LutSet:
     """A set with those colors [N_h, N_e, N_m, 3] and, at every node, rings that hold 1 : 2 : 3 ... of the light."""
-    edges = profiles.default_edges(16)
+    edges = profiles.ring_edges(16)
     rings = np.broadcast_to(np.arange(1.0, 17)[:, None] / 136, (*grid.shape, 16, 3))
     profile = ProfileLut(grid, edges, rings, np.zeros((*grid.shape, 3)))
     return LutSet(ColorLut(grid, cells), profile, NO_PATHS, MANIFEST | manifest)

@@ -125,7 +125,7 @@ def walked(photons: int, seed: int, wavelengths: str = WAVELENGTHS, anchored: bo
     """Colors of all nodes from one trace per wavelength, its profiles expanded too; totals exact if `anchored`."""
     rule = quadrature.load(wavelengths)
     medium, reach = bake.skin_medium(RECIPE.skin, rule.wavelength_nm)
-    paths = path_table.trace(medium, *reach, profiles.default_edges(), photons, seed)
+    paths = path_table.trace(medium, *reach, profiles.ring_edges(), photons, seed)
     if anchored:
         exact = exact_totals.exact_totals(RECIPE.skin)
         paths = paths.anchored(exact.grid(rule.wavelength_nm, paths.mu_epidermis, paths.mu_dermis))

@@ -37,7 +37,7 @@ PROFILE_SIZES = ((6, 3, 4), (8, 4, 8), (12, 4, 8), (16, 4, 8), (24, 6, 12), (32,
 """Nodes of melanin, eumelanin and hemoglobin."""
 STORED = {"float": np.float32, "half": np.float16}
 FAR_SHARE, HALF_NORMAL, HALF_MAX = 1e-3, 2.0**-14, 65_504.0
-_EDGES = profiles.default_edges()
+_EDGES = profiles.ring_edges()
 _TABLES = (
     "Nodes: melanin × eumelanin × hemoglobin. Spacing of melanin and hemoglobin as named; of eumelanin linear, or even "
     "in e^0.6 (crosses).\nFilled: float. Hollow, dotted: the cube-root tables as half."
