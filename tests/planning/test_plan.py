@@ -6,14 +6,17 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import replace
+from functools import cache
 
 import bench_plan
 import numpy as np
 import pytest
 
 from lutgen import cli
+from lutgen.commands import plan as plan_command
 from lutgen.errors import InputError
 from lutgen.planning import costs, judge, prediction, stored_paths, verify
+from lutgen.planning import plan as search_plan
 from lutgen.planning.needs import scene
 from lutgen.planning.plan import _apart, least
 from lutgen.solvers import exact_totals, path_table, profiles
@@ -51,6 +54,15 @@ def expanded():
 def few_draws(monkeypatch):
     """Fewer draws of the noise: a coarser prediction in less time."""
     monkeypatch.setattr(prediction, "DRAWS", 128)
+
+
+_searched = cache(lambda needs, draws: search_plan.least(needs))
+
+
+@pytest.fixture(autouse=True)
+def _one_search_for_each_scene(monkeypatch):
+    """The command's searches, each done once: many tests look at what it says of the same scene."""
+    monkeypatch.setattr(plan_command, "least", lambda needs: _searched(needs, prediction.DRAWS))
 
 
 def run(capsys, *arguments):
@@ -111,7 +123,7 @@ def test_drawn_noise_is_that_of_traces():
 # The search
 
 
-def test_an_axis_that_does_not_vary_has_one_node_and_one_that_does_is_as_wide_as_the_tones():
+def test_an_axis_that_does_not_vary_has_one_node_and_one_that_does_is_as_wide_as_the_tones(few_draws):
     recipe = least(scene("melanin=0.02:0.06,hemoglobin=0.01,eumelanin=0.4", tolerance=1.0)).recipe
     for grid in (recipe.color, recipe.profile):
         assert (grid.melanin.low, grid.melanin.high) == (0.02, 0.06)
@@ -141,7 +153,7 @@ def test_a_wider_pixel_never_asks_more_rings_or_taps(few_draws):
         assert wide.profile <= narrow.profile
 
 
-def test_a_profile_narrower_than_the_pixel_is_left_out(capsys, tmp_path):
+def test_a_profile_narrower_than_the_pixel_is_left_out(capsys, tmp_path, few_draws):
     """Then the recipe holds the least that a bake takes: one node, 8 rings; and that bakes."""
     status, text, _ = run(
         capsys, "plan", "--tones", "light,dark", "--mm-per-pixel", 20, "--explain", "--write", tmp_path / "r.toml"
@@ -216,12 +228,12 @@ def test_where_the_tolerance_costs_too_much_it_is_said_what_can_be_had(limit, fe
     assert plan.cost[1] <= limit.get("bytes", np.inf)
 
 
-def test_no_seconds_at_all_is_a_limit_too():
+def test_no_seconds_at_all_is_a_limit_too(few_draws):
     with pytest.raises(InputError, match=r"^seconds = 0: 0.5 ΔE00 with EE 0.025 takes .* s at least;"):
         least(scene("light", seconds=0.0))
 
 
-def test_a_viewer_that_cannot_hold_and_a_scale_not_measured_are_said(capsys):
+def test_a_viewer_that_cannot_hold_and_a_scale_not_measured_are_said(capsys, few_draws):
     status, text, _ = run(capsys, "plan", "--tones", "light", "--tolerance", 0.02)
     assert status == 0
     assert "viewer: tier reference, 64 taps; EE 0.0037 under a disc of 6 pixels: no tier is within 0.002" in text
@@ -236,7 +248,7 @@ def test_what_is_too_much_never_reads_as_the_limit(value, limit, shown):
     assert _apart(value, limit, 2) == shown
 
 
-def test_where_nothing_can_be_had_for_so_little_it_is_said(capsys, tmp_path):
+def test_where_nothing_can_be_had_for_so_little_it_is_said(capsys, tmp_path, few_draws):
     out = tmp_path / "r.toml"
     status, text, err = run(capsys, "plan", "--tones", "light", "--seconds", 0.01, "--write", out)
     assert (status, text) == (2, "")
@@ -248,7 +260,7 @@ def test_where_nothing_can_be_had_for_so_little_it_is_said(capsys, tmp_path):
 # The command
 
 
-def test_the_written_recipe_is_the_plan_s_and_is_not_overwritten(capsys, tmp_path):
+def test_the_written_recipe_is_the_plan_s_and_is_not_overwritten(capsys, tmp_path, few_draws):
     out = tmp_path / "r.toml"
     status, text, err = run(capsys, "plan", "--tones", "light,dark", "--json", "--write", out)
     assert (status, err) == (0, "")
@@ -299,7 +311,7 @@ def test_a_place_that_is_no_folder_is_said_before_any_work(capsys, tmp_path):
     assert str(tmp_path / "file") in err
 
 
-def test_a_recipe_that_cannot_be_written_leaves_nothing(capsys, tmp_path, monkeypatch):
+def test_a_recipe_that_cannot_be_written_leaves_nothing(capsys, tmp_path, monkeypatch, few_draws):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 

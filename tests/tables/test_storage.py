@@ -272,35 +272,46 @@ def test_folders_without_a_set_are_named(tmp_path):
         storage.load(tmp_path)
 
 
+SAVER = """
+import os, sys, lutgen
+from lutgen.tables import preview, storage
+luts = lutgen.load()
+for out in sys.stdin:
+    child = os.fork()
+    if not child:
+        storage.save(luts, out.strip())
+        while True:
+            storage.save(luts, out.strip(), force=True)
+    print(child, flush=True)
+    print(os.waitpid(child, 0)[0], flush=True)
+"""
+"""Forks a process for each folder that it reads, which saves there again and again; says when that one has ended."""
+
+
 def test_killed_at_any_moment_a_set_is_whole_or_absent(tmp_path):
-    """50 saves in a process that is killed at moments spread over one save; then the next bake clears what is left."""
-    script = (
-        "import sys, lutgen; from lutgen.tables import storage; luts = lutgen.load();"
-        "\n"
-        "i = 0\n"
-        "while True:\n"
-        "    print(i, flush=True); storage.save(luts, sys.argv[1], force=i > 0); i += 1\n"
-    )
+    """50 saves in a process that is killed at moments spread over two saves; then the next bake clears what is left."""
     rng = np.random.default_rng(0)
     whole = absent = 0
-    for attempt in range(50):
-        folder = tmp_path / f"kill-{attempt}"
-        folder.mkdir()
-        out = folder / "set"
-        process = subprocess.Popen([sys.executable, "-c", script, str(out)], stdout=subprocess.PIPE, text=True)
-        assert process.stdout
-        assert process.stdout.readline().strip() == "0"  # the first save begins
-        time.sleep(float(rng.uniform(0, 0.8)))
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        process.stdout.close()
-        if out.exists():
-            storage.load(out)
-            whole += 1
-        else:
-            absent += 1
-        folders.check_target(out, force=True)
-        assert {path.name for path in folder.iterdir()} <= {"set"}
+    command = [sys.executable, "-c", SAVER]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1) as saver:
+        assert saver.stdin
+        assert saver.stdout
+        for attempt in range(50):
+            folder = tmp_path / f"kill-{attempt}"
+            folder.mkdir()
+            out = folder / "set"
+            saver.stdin.write(f"{out}\n")
+            process = int(saver.stdout.readline())  # the first save begins
+            time.sleep(float(rng.uniform(0, 0.4)))
+            os.kill(process, signal.SIGKILL)
+            assert int(saver.stdout.readline()) == process
+            if out.exists():
+                storage.load(out)
+                whole += 1
+            else:
+                absent += 1
+            folders.check_target(out, force=True)
+            assert {path.name for path in folder.iterdir()} <= {"set"}
     assert whole
     assert absent
 

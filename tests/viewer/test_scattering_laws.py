@@ -20,11 +20,13 @@ def plane():
     laws.release(made)
 
 
-@pytest.mark.parametrize("mm_per_pixel", [0.05, 0.2, 0.5])
+@pytest.mark.parametrize(
+    ("mm_per_pixel", "tones"), [(0.05, TONES[:: len(TONES) - 1]), (0.2, TONES), (0.5, TONES[:: len(TONES) - 1])]
+)
 @pytest.mark.parametrize(("taps", "allowed"), [(64, 0.009), (16, 0.03)])
-def test_searchlight(plane, mm_per_pixel, taps, allowed):
-    """Measured .0065, .0043 and .0037 with 64 taps, .0134, .0110 and .0051 with 16."""
-    assert max(laws.searchlight(plane, tone, mm_per_pixel, taps) for tone in TONES) <= allowed
+def test_searchlight(plane, mm_per_pixel, tones, taps, allowed):
+    """Measured .0065, .0043 and .0037 with 64 taps, .0134, .0110 and .0051 with 16; an end of the tones is worst."""
+    assert max(laws.searchlight(plane, tone, mm_per_pixel, taps) for tone in tones) <= allowed
 
 
 @pytest.mark.parametrize(("taps", "allowed"), [(64, 0.02), (16, 0.04)])
