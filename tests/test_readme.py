@@ -2,11 +2,14 @@
 
 import doctest
 import re
+import shlex
 import subprocess
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+
+from lutgen.commands.parser import parser
 
 ROOT = Path(__file__).parent.parent
 LISTED = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True)
@@ -72,6 +75,17 @@ def test_the_front_pages_python_gives_what_it_shows():
     example = doctest.DocTestParser().get_doctest(block, {}, "README.md", str(FRONT), 0)
     assert len(example.examples) >= 8
     assert doctest.DocTestRunner().run(example).failed == 0
+
+
+def test_commands_that_readmes_show_parse():
+    texts = [path.read_text(encoding="utf-8").replace("\\\n", "") for path in READMES]
+    shown = [line for text in texts for block in re.findall(r"^```sh\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+             for line in block.split("\n") if line.startswith("lutgen ")]  # fmt: skip
+    shown += re.findall(r"`(lutgen \w[^`]*)`", FRONT.read_text(encoding="utf-8"))
+    assert len(shown) > 12
+    for line in shown:
+        words = shlex.split(line)[1:]
+        assert parser(words[:1]).parse_args(words).command == words[0]
 
 
 def test_sections_that_comments_cite_exist():
