@@ -43,6 +43,9 @@ def _adapt(source: np.ndarray, target: np.ndarray) -> np.ndarray:
 SRGB_FROM_XYZ = _rgb_from_xyz(_PRIMARIES_SRGB, WHITE_D65)
 ACESCG_FROM_XYZ = _rgb_from_xyz(_PRIMARIES_AP1, _WHITE_ACES) @ _adapt(WHITE_D65, _WHITE_ACES)
 """Linear ACEScg from XYZ under D65: CAT02 to the ACES white, then AP1 primaries."""
+XYZ_FROM_SRGB, XYZ_FROM_ACESCG = np.linalg.inv(SRGB_FROM_XYZ), np.linalg.inv(ACESCG_FROM_XYZ)
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Y of linear sRGB as displays and tone curves take it (ITU-R BT.709), to four digits."""
 
 
 @cache
@@ -101,6 +104,24 @@ def from_xyz(xyz, space: str, pipeline: str = "default") -> np.ndarray:
     return np.asarray(xyz, float) @ _matrix(space, pipeline).T
 
 
+def to_xyz(linear_srgb) -> np.ndarray:
+    """XYZ [..., 3] under D65 of linear sRGB [..., 3].
+
+    >>> [round(float(v), 4) for v in to_xyz([1, 1, 1])]
+    [0.9505, 1.0, 1.0891]
+    """
+    return np.asarray(linear_srgb, float) @ XYZ_FROM_SRGB.T
+
+
+def to_acescg(linear_srgb) -> np.ndarray:
+    """Linear ACEScg [..., 3] of linear sRGB [..., 3].
+
+    >>> [round(float(v), 3) for v in to_acescg([1, 0, 0])]
+    [0.613, 0.07, 0.02]
+    """
+    return from_xyz(to_xyz(linear_srgb), "acescg")
+
+
 def from_acescg(acescg, space: str, pipeline: str = "default") -> np.ndarray:
     """Linear, unclipped values [..., 3] in `srgb`, `acescg` or `xyz` of ACEScg values [..., 3].
 
@@ -109,7 +130,7 @@ def from_acescg(acescg, space: str, pipeline: str = "default") -> np.ndarray:
     """
     if space == "acescg":
         return np.asarray(acescg, float)
-    return np.asarray(acescg, float) @ (_matrix(space, pipeline) @ np.linalg.inv(ACESCG_FROM_XYZ)).T
+    return np.asarray(acescg, float) @ (_matrix(space, pipeline) @ XYZ_FROM_ACESCG).T
 
 
 def _matrix(space: str, pipeline: str) -> np.ndarray:

@@ -178,8 +178,8 @@ def compose(stage: Stage, scattered: str, reflected: str, exposure: float) -> No
     gl.context().enable_only(moderngl.NOTHING)
     buffer.use()
     gl.bind(program, scattered=stage.targets[scattered], reflected_light=stage.targets[reflected])
-    gl.put(program, srgb_from_acescg=color.from_acescg(np.eye(3), "srgb").T, exposure=exposure,
-           samples=SAMPLES)  # fmt: skip
+    gl.put(program, srgb_from_acescg=color.from_acescg(np.eye(3), "srgb").T, luminance=tuple(color.LUMINANCE),
+           exposure=exposure, samples=SAMPLES)  # fmt: skip
     stage.compose.array.render()
 
 

@@ -27,7 +27,7 @@ def draw(
     skins = [v[pick].ravel() for v in (found.melanin, found.hemoglobin)]
     surface = skin_colors.of(luts, found.eumelanin)
     at = np.stack([a.position(v) for a, v in zip((surface.melanin, surface.hemoglobin), skins, strict=True)])
-    from_xyz = color.SRGB_FROM_XYZ * (np.linalg.inv(color.SRGB_FROM_XYZ) @ np.ones(3))
+    from_xyz = color.SRGB_FROM_XYZ * (color.XYZ_FROM_SRGB @ np.ones(3))
     shown = (from_xyz @ surface.read(at.astype("f4"))[0]).T.reshape(thin.shape)
     share = np.clip(found.residual[pick] / (2 * REACH), 0, 1) * (len(_LEFT) - 1)
     left = np.stack([np.interp(share, np.arange(len(_LEFT)), channel) for channel in _LEFT.T], axis=-1)

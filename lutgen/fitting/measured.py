@@ -156,7 +156,7 @@ def of_color(space: str, values: np.ndarray) -> Measured:
     if space == "xyz":
         return Measured(values, space)
     linear = color.decode_srgb(values) if space == "srgb" else values
-    return Measured(linear @ np.linalg.inv(color.SRGB_FROM_XYZ).T, space)
+    return Measured(color.to_xyz(linear), space)
 
 
 def _from_csv(path: Path) -> Measured:

@@ -17,9 +17,9 @@ from lutgen.tables.lut_set import LutSet
 _FACTOR = (0.05, 8.0)
 """Least and most that what the LUT does not explain may multiply a channel by."""
 _NODES = 256
-_SRGB = color.SRGB_FROM_XYZ.astype("f4") * (np.linalg.inv(color.SRGB_FROM_XYZ) @ np.ones(3)).astype("f4")
-_ACESCG = color.ACESCG_FROM_XYZ.astype("f4") * (np.linalg.inv(color.SRGB_FROM_XYZ) @ np.ones(3)).astype("f4")
-_SRGB_FROM_ACESCG = (color.SRGB_FROM_XYZ @ np.linalg.inv(color.ACESCG_FROM_XYZ)).astype("f4")
+_SRGB = color.SRGB_FROM_XYZ.astype("f4") * (color.XYZ_FROM_SRGB @ np.ones(3)).astype("f4")
+_ACESCG = color.ACESCG_FROM_XYZ.astype("f4") * (color.XYZ_FROM_SRGB @ np.ones(3)).astype("f4")
+_SRGB_FROM_ACESCG = (color.SRGB_FROM_XYZ @ color.XYZ_FROM_ACESCG).astype("f4")
 
 
 def moves(

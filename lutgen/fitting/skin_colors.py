@@ -21,8 +21,7 @@ from lutgen.tables.axes import Axis
 from lutgen.tables.lut_set import LutSet
 
 CHUNK = 1 << 15
-_XYZ = np.linalg.inv(color.SRGB_FROM_XYZ)
-_RELATIVE = (_XYZ / (_XYZ @ np.ones(3))[:, None]).astype("f4")
+_RELATIVE = (color.XYZ_FROM_SRGB / (color.XYZ_FROM_SRGB @ np.ones(3))[:, None]).astype("f4")
 _DELTA = 6 / 29
 _STARTS, _ACROSS, _MARGIN = 16, 24, 12.0
 """Nodes along each axis of the starting points; cells along each side of their table; CIELAB units beyond the skins."""

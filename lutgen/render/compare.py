@@ -31,7 +31,6 @@ BOX = 4
 _LEAST = BOX * BOX // 2
 _DRAWS = 64
 _STEP = 0.1  # in Lab, for the metric: small beside where its weights change
-_XYZ_FROM_ACESCG = np.linalg.inv(color.ACESCG_FROM_XYZ)
 _LAB_FROM_F = np.array([[0.0, 116, 0], [500, -500, 0], [0, 200, -200]])
 
 
@@ -88,10 +87,10 @@ def compare(a: Picture, b: Picture) -> Difference:
     covariance = sum((one.covariance for one in (a, b) if one.covariance is not None), np.zeros((*seen.shape, 3, 3)))
     summed = _boxed((covariance * seen[..., None, None]).reshape(*seen.shape, 9))[full].reshape(-1, 3, 3)
 
-    labs = [color.lab(mean @ _XYZ_FROM_ACESCG.T) for mean in means]
+    labs = [color.lab(mean @ color.XYZ_FROM_ACESCG.T) for mean in means]
     middle = (means[0] + means[1]) / 2
     J = _lab_derivative(middle)
-    metric = np.einsum("nia,nij,njb->nab", J, _metric(color.lab(middle @ _XYZ_FROM_ACESCG.T)), J)
+    metric = np.einsum("nia,nij,njb->nab", J, _metric(color.lab(middle @ color.XYZ_FROM_ACESCG.T)), J)
     S = summed / count[..., None] ** 2
     noise = np.einsum("nab,nab->n", metric, S)
     squared = color.delta_e00(*labs) ** 2
@@ -150,9 +149,9 @@ def _scatter(
 def _lab_derivative(acescg: np.ndarray) -> np.ndarray:
     """Derivative [N, 3, 3] of Lab by linear ACEScg [N, 3]."""
     white = color.from_acescg(np.ones(3), "xyz")
-    ratio, delta = acescg @ _XYZ_FROM_ACESCG.T / white, 6 / 29
+    ratio, delta = acescg @ color.XYZ_FROM_ACESCG.T / white, 6 / 29
     slope = np.where(ratio > delta**3, np.cbrt(np.maximum(ratio, delta**3)) ** -2 / 3, 1 / (3 * delta**2))
-    return np.einsum("ik,nk,kj->nij", _LAB_FROM_F, slope / white, _XYZ_FROM_ACESCG)
+    return np.einsum("ik,nk,kj->nij", _LAB_FROM_F, slope / white, color.XYZ_FROM_ACESCG)
 
 
 def _metric(lab: np.ndarray) -> np.ndarray:

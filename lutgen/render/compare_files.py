@@ -72,7 +72,7 @@ def _exr(path: Path) -> Picture:
         return Picture(path.name, rgb, covariance, skin, notes, seed)
     if not np.allclose(part.chromaticities, exr.REC709, atol=1e-4):
         raise InputError(f"picture {path}: has other primaries than ACEScg and Rec. 709; convert it")
-    return Picture(path.name, _acescg(rgb), None, skin)
+    return Picture(path.name, color.to_acescg(rgb), None, skin)
 
 
 def _noise(part: exr.Part, rgb: np.ndarray, path: Path) -> tuple[np.ndarray | None, tuple[str, ...]]:
@@ -105,11 +105,7 @@ def _display(path: Path) -> Picture:
         raise InputError(f"picture {path}: cannot be read ({error})") from error
     note = f"{path.name}: 8-bit sRGB, so a tone curve in it counts as difference"
     skin = encoded[..., 3] if seen else None
-    return Picture(path.name, _acescg(color.decode_srgb(encoded[..., :3])), None, skin, (note,))
-
-
-def _acescg(srgb: np.ndarray) -> np.ndarray:
-    return color.from_xyz(srgb @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg")
+    return Picture(path.name, color.to_acescg(color.decode_srgb(encoded[..., :3])), None, skin, (note,))
 
 
 def mask(a: Picture, b: Picture) -> tuple[np.ndarray, tuple[str, ...]]:

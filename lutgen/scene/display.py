@@ -6,7 +6,6 @@ import numpy as np
 
 from lutgen import color
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _SHOULDER, _DESATURATION = 0.76, 0.15
 _CENTER, _EDGE = np.array([0.030, 0.033, 0.038]), np.array([0.0045, 0.0048, 0.0060])
 
@@ -21,7 +20,7 @@ def shown(acescg: np.ndarray, exposure: float = 0.0) -> np.ndarray:
     [[0.41, 0.41, 0.41], [1.0, 0.955, 0.958]]
     """
     linear = color.from_acescg(np.asarray(acescg, float) * 2.0**exposure, "srgb")
-    gray, least = np.maximum(linear @ _LUMINANCE, 0)[..., None], linear.min(axis=-1, keepdims=True)
+    gray, least = np.maximum(linear @ color.LUMINANCE, 0)[..., None], linear.min(axis=-1, keepdims=True)
     outside = (least < 0) & (gray > least)
     mixed = gray + (linear - gray) * (gray / np.where(outside, gray - least, 1))
     return color.encode_srgb(_neutral(np.where(outside, mixed, linear)))

@@ -46,8 +46,7 @@ def read(path: Path) -> np.ndarray:
     if radiance.max() > MOST:
         most = f"{radiance.max():g}; allowed is 0 to {MOST:g}"
         raise InputError(f"environment {path}: holds a radiance of {most}; scale it down")
-    acescg = color.from_xyz(radiance @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg")
-    return np.maximum(acescg, 0.0)
+    return np.maximum(color.to_acescg(radiance), 0.0)
 
 
 def _exr(path: Path) -> np.ndarray:

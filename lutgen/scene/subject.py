@@ -63,7 +63,7 @@ def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
     Multiplied with the color of any skin it is `LutSet.recolor` with the painted skin's own mean as base: the detail
     stays, the tone is the sliders'.
     """
-    acescg = np.maximum(color.from_xyz(albedo @ np.linalg.inv(color.SRGB_FROM_XYZ).T, "acescg"), 1e-4)
+    acescg = np.maximum(color.to_acescg(albedo), 1e-4)
     painted = acescg.sum(axis=-1) > coverage * 3
     if not painted.any():
         raise InputError("albedo is black throughout: there is no skin on it")

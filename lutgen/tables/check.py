@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lutgen import color
 from lutgen.errors import InputError
 from lutgen.solvers import exact_totals
 from lutgen.tables import expand, storage
@@ -76,7 +77,7 @@ def _finite(name: str, values: np.ndarray) -> Finding:
 def _monotone(luts: LutSet) -> Finding:
     if luts.color_lut.grid.melanin.count == 1:
         return Finding("monotone in melanin", True, "melanin is fixed")
-    rises = np.diff(luts.color_lut.acescg @ np.linalg.inv(expand.ACESCG_FROM_XYZ)[1], axis=2)
+    rises = np.diff(luts.color_lut.acescg @ color.XYZ_FROM_ACESCG[1], axis=2)
     return Finding("monotone in melanin", bool(rises.max() < 0), f"luminance changes by {rises.max():.2e} at most")
 
 

@@ -2,6 +2,7 @@
 // Scattered and reflected light together, then exposure, gamut, tone curve, sRGB and dither.
 uniform sampler2D scattered, reflected_light;
 uniform mat3 srgb_from_acescg;
+uniform vec3 luminance;           // of linear sRGB
 uniform float exposure;
 uniform int samples;              // pixels averaged along x and y
 in vec2 screen;
@@ -9,7 +10,7 @@ out vec4 pixel;
 
 // Toward gray as far as the most negative channel needs, so that pure red light keeps its hue (instead of clipping).
 vec3 into_gamut(vec3 c) {
-    float gray = max(dot(c, vec3(0.2126, 0.7152, 0.0722)), 0.0), least = min(c.r, min(c.g, c.b));
+    float gray = max(dot(c, luminance), 0.0), least = min(c.r, min(c.g, c.b));
     return least < 0.0 && gray > least ? mix(vec3(gray), c, gray / (gray - least)) : c;
 }
 
