@@ -247,7 +247,10 @@ class Profiles:
             spans = [_widened(np.concatenate([pair[layer] for pair in mu], axis=1)) for layer in (0, 1)]
             drawn, roots = stored_paths.noise(table, nu, (spans[0], spans[1]), DRAWS, SEED)
             at_radii = np.einsum(
-                "rb,skbij->srkij", stored_paths.within(stored_paths.edges(), self.radius_mm)[:, 1:], drawn
+                "rb,skbij->srkij",
+                stored_paths.within(stored_paths.edges(), self.radius_mm)[:, 1:],
+                drawn,
+                optimize=True,
             )
             S, R = at_radii.shape[:2]
             flat = at_radii.reshape(S * R, -1).astype("f4")
