@@ -143,7 +143,7 @@ class Screen:
             self.viewer.stdout.close()
 
 
-LOOK = {"distance_mm": 420, "azimuth": 0, "elevation": 0, "target_mm": "0,-30,0"}
+LOOK = {"distance_mm": 420, "azimuth": 0, "elevation": 0, "target_mm": "0,-30,0", "tier": "low"}
 SET = [text for name, value in LOOK.items() for text in ("--set", f"{name}={value}")]
 
 
