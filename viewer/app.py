@@ -18,29 +18,29 @@ from lutgen.scene.look import Look
 from lutgen.tables.lut_set import LutSet
 
 from . import passes
-from . import stage as stages
+from .stage import Stage, set_environment, upload
 
 SIZE = (1280, 720)
 
 
 def open_stage(
-    luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int], other: LutSet | None = None,
+    luts: LutSet, shape: Mesh, maps: Maps, size: tuple[int, int], other: LutSet | None = None,
     around: np.ndarray | None = None,
-) -> stages.Stage:  # fmt: skip
+) -> Stage:  # fmt: skip
     """The stage of a head, its maps, a LUT set, maybe another to compare it with, and light from all around."""
-    stage = stages.open_stage(shape, subject.textures_of(given), luts, size, other)
-    stage.full_contrast_melanin = given.full_contrast_melanin
-    stages.set_environment(stage, around)
+    stage = upload(shape, subject.textures_of(maps), luts, size, other)
+    stage.full_contrast_melanin = maps.full_contrast_melanin
+    set_environment(stage, around)
     return stage
 
 
-def picture(stage: stages.Stage, look: Look) -> np.ndarray:
+def picture(stage: Stage, look: Look) -> np.ndarray:
     """One frame as 8-bit sRGB [height, width, 3], first row on top."""
     passes.draw(stage, look)
     return passes.pixels(stage)
 
 
-def screenshot(stage: stages.Stage, look: Look, path: Path | str) -> None:
+def screenshot(stage: Stage, look: Look, path: Path | str) -> None:
     """Draw a look and write it: to an EXR as radiance, before exposure and tone curve, else as the display shows it."""
     if Path(path).suffix.lower() != ".exr":
         return write(picture(stage, look), path)
@@ -51,7 +51,7 @@ def screenshot(stage: stages.Stage, look: Look, path: Path | str) -> None:
         exr.write(partial, [exr.Part("view", channels, {"look": asdict(look), "size": list(stage.size)})])
 
 
-def sheet(stage: stages.Stage, look: Look, columns: int = 3, progress: Callable = lambda name: None) -> np.ndarray:
+def sheet(stage: Stage, look: Look, columns: int = 3, progress: Callable = lambda name: None) -> np.ndarray:
     """Every preset beside the others, [rows x height, columns x width, 3], each with its name."""
     from PIL import Image, ImageDraw
 
@@ -59,9 +59,9 @@ def sheet(stage: stages.Stage, look: Look, columns: int = 3, progress: Callable 
     width, height = stage.size
     rows = -(-len(sheet_looks) // columns)
     whole = Image.new("RGB", (columns * width, rows * height))
-    for i, (name, one) in enumerate(sheet_looks.items()):
+    for i, (name, preset) in enumerate(sheet_looks.items()):
         progress(name)
-        frame = Image.fromarray(picture(stage, one))
+        frame = Image.fromarray(picture(stage, preset))
         ImageDraw.Draw(frame).text((10, height - 20), name, fill=(220, 220, 220))
         whole.paste(frame, (i % columns * width, i // columns * height))
     return np.asarray(whole)

@@ -43,12 +43,12 @@ def text(name: str) -> str:
     return (files("lutgen.viewer") / "shaders" / name).read_text()
 
 
-def splice(name: str, made: dict[str, str] | None = None) -> str:
-    """A shader with its `#include "…"` lines replaced by files, or by texts made elsewhere."""
+def splice(name: str, texts: dict[str, str] | None = None) -> str:
+    """A shader with its `#include "…"` lines replaced by files, or by `texts` of their names."""
 
     def included(match: re.Match) -> str:
         other = match.group(1)
-        return (made or {})[other] if other in (made or {}) else splice(other, made)
+        return texts[other] if texts and other in texts else splice(other, texts)
 
     return re.sub(r'^#include "([^"]+)"$', included, text(name), flags=re.MULTILINE)
 
@@ -62,10 +62,10 @@ class Pass:
     corners: moderngl.Buffer
 
 
-def full_screen(fragment: str, made: dict[str, str] | None = None) -> Pass:
+def full_screen(fragment: str, texts: dict[str, str] | None = None) -> Pass:
     """A pass of one fragment shader; `screen` in it runs over 0 to 1."""
     gl = context()
-    program = gl.program(vertex_shader=splice("screen.vert.glsl"), fragment_shader=splice(fragment, made))
+    program = gl.program(vertex_shader=splice("screen.vert.glsl"), fragment_shader=splice(fragment, texts))
     corners = gl.buffer(np.array([-1, -1, 3, -1, -1, 3], "f4").tobytes())
     return Pass(program, gl.vertex_array(program, [(corners, "2f", "corner")]), corners)
 
@@ -94,28 +94,28 @@ def bind(program: moderngl.Program, **textures) -> None:
 
 def texture(size: tuple[int, int], components: int = 4, kind: str = "f2", data: bytes | None = None):
     """A 2-D texture read texel by texel, its edges held."""
-    made = context().texture(size, components, data, dtype=kind, alignment=1)
-    made.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    made.repeat_x = made.repeat_y = False
-    return made
+    texture = context().texture(size, components, data, dtype=kind, alignment=1)
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    texture.repeat_x = texture.repeat_y = False
+    return texture
 
 
 def levels(pictures: list[np.ndarray]):
     """A texture whose mip levels are given [rows, columns, 3], each half the size of the one before; wraps along x."""
-    made = context().texture(pictures[0].shape[1::-1], 3, dtype="f2")
-    made.build_mipmaps(0, len(pictures) - 1)
+    texture = context().texture(pictures[0].shape[1::-1], 3, dtype="f2")
+    texture.build_mipmaps(0, len(pictures) - 1)
     for level, picture in enumerate(pictures):
-        made.write(np.minimum(picture, 65504).astype("f2").tobytes(), level=level, alignment=1)
-    made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    made.repeat_x, made.repeat_y = True, False
-    return made
+        texture.write(np.minimum(picture, 65504).astype("f2").tobytes(), level=level, alignment=1)
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.repeat_x, texture.repeat_y = True, False
+    return texture
 
 
 def table(values: np.ndarray) -> moderngl.Texture:
     """A float texture of an array [rows, columns, channels], read linearly between texel centers."""
-    made = texture(values.shape[1::-1], values.shape[2], "f4", np.ascontiguousarray(values, "f4").tobytes())
-    made.filter = (moderngl.LINEAR, moderngl.LINEAR)
-    return made
+    table = texture(values.shape[1::-1], values.shape[2], "f4", np.ascontiguousarray(values, "f4").tobytes())
+    table.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    return table
 
 
 def image(values: np.ndarray, anisotropy: float = ANISOTROPY) -> moderngl.Texture:
@@ -124,8 +124,8 @@ def image(values: np.ndarray, anisotropy: float = ANISOTROPY) -> moderngl.Textur
         values = values[..., None]
     kind = "f1" if values.dtype == np.uint8 else "f2"
     data = np.ascontiguousarray(values if kind == "f1" else values.astype("f2"))
-    made = context().texture(data.shape[1::-1], data.shape[2], data.tobytes(), alignment=1, dtype=kind)
-    return filtered(made, anisotropy)
+    texture = context().texture(data.shape[1::-1], data.shape[2], data.tobytes(), alignment=1, dtype=kind)
+    return filtered(texture, anisotropy)
 
 
 def filtered(texture: moderngl.Texture, anisotropy: float = ANISOTROPY) -> moderngl.Texture:
@@ -139,12 +139,12 @@ def filtered(texture: moderngl.Texture, anisotropy: float = ANISOTROPY) -> moder
 def volume(values: np.ndarray):
     """A 3-D float texture of an array [depth, height, width, 4], read linearly between texel centers."""
     depth, height, width, components = values.shape
-    made = context().texture3d(
+    volume = context().texture3d(
         (width, height, depth), components, np.ascontiguousarray(values, "f4").tobytes(), dtype="f4"
     )
-    made.filter = (moderngl.LINEAR, moderngl.LINEAR)
-    made.repeat_x = made.repeat_y = made.repeat_z = False
-    return made
+    volume.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    volume.repeat_x = volume.repeat_y = volume.repeat_z = False
+    return volume
 
 
 def read(target: moderngl.Framebuffer, attachment: int = 0, kind: str = "f4", components: int = 4) -> np.ndarray:

@@ -24,8 +24,8 @@ class Side:
 def upload(luts: LutSet) -> Side:
     """A side that shows a set as it is stored."""
     uploaded = textures.upload(luts)
-    made = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
-    return Side(luts, luts, uploaded, gl.full_screen("gather.frag.glsl", made))
+    texts = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
+    return Side(luts, luts, uploaded, gl.full_screen("gather.frag.glsl", texts))
 
 
 def one_burley(plain: Side) -> Side:
@@ -43,7 +43,7 @@ def expand(side: Side, oxygenation: float) -> None:
 
 def release(sides: dict[str, Side]) -> None:
     """Free everything that sides hold, what they share once."""
-    volumes = {id(t): t for one in sides.values() for t in (one.textures.color, one.textures.rings,
-                                                           one.textures.encircled)}  # fmt: skip
-    laws = {id(one.gather): one.gather for one in sides.values()}
-    gl.free(*volumes.values(), *(part for law in laws.values() for part in (law.array, law.program, law.corners)))
+    tables = [side.textures for side in sides.values()]
+    volumes = {id(volume): volume for t in tables for volume in (t.color, t.rings, t.encircled)}
+    gathers = {id(side.gather): side.gather for side in sides.values()}
+    gl.free(*volumes.values(), *(part for g in gathers.values() for part in (g.array, g.program, g.corners)))

@@ -17,9 +17,8 @@ from lutgen.scene import look as looks
 from lutgen.scene.look import Look
 
 from . import gl, lut_sides
-from . import stage as stages
 from .measure import clock
-from .stage import REFLECTED, SAMPLES, Stage
+from .stage import REFLECTED, SAMPLES, Stage, side
 
 TAPS = {"off": 0, "low": 8, "medium": 16, "high": 64, "reference": 64}
 REFERENCE_FRAMES = 16
@@ -38,7 +37,7 @@ def set_oxygenation(stage: Stage, oxygenation: float) -> None:
 def require(stage: Stage, look: Look) -> None:
     """Raise InputError where the stage cannot show a look: chromophores outside the LUTs' axes, no LUT set to split."""
     for name in {"none", look.split} & {"none", "set"}:
-        grid = stages.side(stage, name).luts.color_lut.grid
+        grid = side(stage, name).luts.color_lut.grid
         for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin):
             in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
 
@@ -155,7 +154,7 @@ def draw_surface(
 def _scatter(
     stage: Stage, look: Look, camera: looks.Camera, split: str, scissor: tuple[int, int, int, int], frame: int
 ) -> None:
-    one, targets, buffer = stages.side(stage, split), stage.targets, stage.targets["scattered_buffer"]
+    one, targets, buffer = side(stage, split), stage.targets, stage.targets["scattered_buffer"]
     program, tables = one.gather.program, one.textures
     context = gl.context()
     context.enable_only(moderngl.BLEND if frame else moderngl.NOTHING)

@@ -58,7 +58,7 @@ class Stage:
         return clock.milliseconds(self.timer)
 
 
-def open_stage(
+def upload(
     mesh, maps: dict[str, np.ndarray], luts: LutSet, size: tuple[int, int], other: LutSet | None = None
 ) -> Stage:
     """Upload a head (positions_mm, normals, uv, triangles), its maps [rows, columns, channels], a LUT set, another."""
@@ -73,7 +73,7 @@ def open_stage(
     head = context.vertex_array(surface, [(buffer, "3f 3f 2f", "position", "normal", "uv")], indices)
     cast = context.vertex_array(shadow, [(buffer, "3f 20x", "position")], indices)
     center = (mesh.positions_mm.max(axis=0) + mesh.positions_mm.min(axis=0)) / 2
-    shown = {name: lut_sides.upload(one) for name, one in (("none", luts), ("set", other)) if one is not None}
+    shown = {name: lut_sides.upload(set_) for name, set_ in (("none", luts), ("set", other)) if set_ is not None}
     stage = Stage(
         size, shown, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
@@ -96,12 +96,6 @@ def side(stage: Stage, split: str) -> lut_sides.Side:
 def _map(values: np.ndarray | None, plain: tuple[float, ...]) -> moderngl.Texture:
     """A map's texture; one plain texel where there is none."""
     return gl.image(np.array([[plain]], "f4") if values is None else values)
-
-
-def set_map(stage: Stage, name: str, values: np.ndarray | None) -> None:
-    """Exchange one of the head's maps."""
-    stage.maps[name].release()
-    stage.maps[name] = _map(values, _PLAIN[name])
 
 
 def set_environment(stage: Stage, radiance: np.ndarray | None) -> None:

@@ -74,7 +74,7 @@ def write(source: Source, folder: Path) -> Report:
         read_thin = np.stack([np.interp(x, np.linspace(0, 1, THICKNESSES), line[:, c]) for c in range(3)], axis=-1)
         exact_thin = through(energy, edges, THICKNESS_MM * x**3)
         error[preset.name] = {"shade": difference(read, exact), "transmission": difference(read_thin, exact_thin)}
-    shade, thin_off = (max(one[k]["largest"] for one in error.values()) for k in ("shade", "transmission"))
+    shade, thin_off = (max(off[k]["largest"] for off in error.values()) for k in ("shade", "transmission"))
     n, m, k = *SIZE, THICKNESSES
     return Report((
         f"shade_PRESET.exr: {n} x {m}, N.L and curvature. transmission_PRESET.exr: {k} x 1, thickness.",

@@ -102,7 +102,7 @@ class Source:
     @cached_property
     def presets(self) -> list[Preset]:
         """The presets that the LUTs cover."""
-        found = []
+        presets = []
         for name, skin in PRESETS.items():
             point = skin.melanin, skin.eumelanin, skin.hemoglobin
             axes = [getattr(self.grid, axis) for axis in AXES]
@@ -111,8 +111,8 @@ class Source:
                 rings, clamped = expand.normalized(profile.energy)
                 edges = profile.radius_edges_mm
                 fit = burley.fit(rings, edges)
-                found.append(Preset(name, point, self.luts.color(*point), rings, edges, clamped, *fit))
-        return found
+                presets.append(Preset(name, point, self.luts.color(*point), rings, edges, clamped, *fit))
+        return presets
 
 
 def nested_size(luts: LutSet) -> int:

@@ -29,27 +29,27 @@ def image(texels: np.ndarray) -> bytes:
 
 def imported(path: Path) -> tuple[str, str, bytes]:
     """The importer's type, suffix and file of an EXR, by the sidecar beside it."""
-    given = parameters(path.with_name(path.name + ".import").read_text())
-    assert given["compress/mode"] == "3"
-    assert given["mipmaps/generate"] == "false"
+    settings = parameters(path.with_name(path.name + ".import").read_text())
+    assert settings["compress/mode"] == "3"
+    assert settings["mipmaps/generate"] == "false"
     source = OpenImageIO.ImageInput.open(str(path))
     assert source is not None
     texels = source.read_image("half")
     assert texels is not None
     source.close()
-    if given["importer"] == "texture":
-        assert given["type"] == "CompressedTexture2D"
-        assert given["process/fix_alpha_border"] == "false"
+    if settings["importer"] == "texture":
+        assert settings["type"] == "CompressedTexture2D"
+        assert settings["process/fix_alpha_border"] == "false"
         head = b"GST2" + struct.pack("<IIIIIIII", 1, texels.shape[1], texels.shape[0], 0, 0, 0, 0, 0)
-        return given["type"], "ctex", head + image(texels)
-    assert given["importer"] == "3d_texture"
-    across, down = int(given["slices/horizontal"]), int(given["slices/vertical"])
+        return settings["type"], "ctex", head + image(texels)
+    assert settings["importer"] == "3d_texture"
+    across, down = int(settings["slices/horizontal"]), int(settings["slices/vertical"])
     width, height = texels.shape[1] // across, texels.shape[0] // down
     tiles = [
         texels[height * i : height * (i + 1), width * j : width * (j + 1)] for i in range(down) for j in range(across)
     ]
     head = b"GSTL" + struct.pack("<IIIIIIII", 1, len(tiles), 3, 0, 0, 0, 0, 0)
-    return given["type"], "ctex3d", head + b"".join(image(tile) for tile in tiles)
+    return settings["type"], "ctex3d", head + b"".join(image(tile) for tile in tiles)
 
 
 def project(folder: Path, under: str) -> dict[str, bytes]:

@@ -102,14 +102,14 @@ def unity_profile(folder) -> np.ndarray:
 
 def sampled(volume: np.ndarray, uvw: np.ndarray) -> np.ndarray:
     """A clamped trilinear fetch [N, 3] at texture coordinates [N, 3], texel i at (i + 0.5) / n, as GPUs define it."""
-    found = np.zeros((len(uvw), 3))
+    colors = np.zeros((len(uvw), 3))
     place = uvw * np.array(volume.shape[2::-1]) - 0.5
     low = np.floor(place).astype(int)
     for corner in np.ndindex(2, 2, 2):
         texel = np.clip(low + corner, 0, np.array(volume.shape[2::-1]) - 1)
         weight = np.where(corner, place - low, 1 - (place - low)).prod(axis=1)
-        found += weight[:, None] * volume[texel[:, 2], texel[:, 1], texel[:, 0]]
-    return found
+        colors += weight[:, None] * volume[texel[:, 2], texel[:, 1], texel[:, 0]]
+    return colors
 
 
 def coordinates(skins: np.ndarray, counts) -> np.ndarray:
@@ -121,10 +121,10 @@ def coordinates(skins: np.ndarray, counts) -> np.ndarray:
 
 @pytest.mark.parametrize(("target", "volume"), [("unreal", unreal_volume), ("unity", unity_volume)])
 def test_colors_lie_where_the_engine_looks(known, target, volume):
-    found = volume(known / target)
-    assert found.shape == (*COUNTS[::-1], 3)
-    for z, y, x in np.ndindex(found.shape[:3]):
-        assert found[z, y, x] == pytest.approx([0.1 + x / 8, 0.1 + y / 4, 0.1 + z / 16], abs=1e-3), (x, y, z)
+    texels = volume(known / target)
+    assert texels.shape == (*COUNTS[::-1], 3)
+    for z, y, x in np.ndindex(texels.shape[:3]):
+        assert texels[z, y, x] == pytest.approx([0.1 + x / 8, 0.1 + y / 4, 0.1 + z / 16], abs=1e-3), (x, y, z)
 
 
 def test_unreals_green_is_down_and_unitys_up(known):
@@ -133,12 +133,12 @@ def test_unreals_green_is_down_and_unitys_up(known):
 
 
 def test_the_cube_runs_red_first(known, asymmetric):
-    found = cube_volume(known / "unity")
-    size = len(found)
+    texels = cube_volume(known / "unity")
+    size = len(texels)
     assert size == 9  # twice the finest axis less one: its nodes are among them
     for z, y, x in np.ndindex(size, size, size):
         share = np.array([x * 4, y * 2, z * 3]) / (size - 1)
-        assert found[z, y, x] == pytest.approx(0.1 + share * [1 / 8, 1 / 4, 1 / 16], abs=1e-6)
+        assert texels[z, y, x] == pytest.approx(0.1 + share * [1 / 8, 1 / 4, 1 / 16], abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -152,9 +152,9 @@ def test_the_cube_runs_red_first(known, asymmetric):
 def test_a_thousand_skins_within_the_stated_error(folder, source, target, volume, stated):
     """Stated is what is measured, and measured here anew: no guess above it."""
     cells = volume(folder / target)
-    found = sampled(cells, coordinates(source.skins, cells.shape[2::-1]))
+    colors = sampled(cells, coordinates(source.skins, cells.shape[2::-1]))
     error = json.loads((folder / "manifest.json").read_text())["export"]["error"][target]
-    off = np.abs(found - source.luts.color(*source.skins.T)).max()
+    off = np.abs(colors - source.luts.color(*source.skins.T)).max()
     assert off == pytest.approx(stated(error)["largest"], rel=1e-3, abs=1e-7)
     assert off < 2e-4
 
@@ -163,8 +163,8 @@ def test_half_a_texel_is_not_lost(known):
     """The ends of the axes are the centers of the outer texels: there a fetch gives the outer nodes and no mix."""
     ends = np.array([[0.001, 0.0, 0.001], [0.5, 1.0, 0.1]])
     for volume, target in ((unreal_volume, "unreal"), (unity_volume, "unity")):
-        found = sampled(volume(known / target), coordinates(ends, COUNTS))
-        assert found == pytest.approx(np.array([[0.1, 0.1, 0.1], [0.6, 0.6, 0.2875]]), abs=1e-3)
+        colors = sampled(volume(known / target), coordinates(ends, COUNTS))
+        assert colors == pytest.approx(np.array([[0.1, 0.1, 0.1], [0.6, 0.6, 0.2875]]), abs=1e-3)
         inside = coordinates(ends, COUNTS) * np.array(COUNTS) - 0.5
         assert inside == pytest.approx(np.array([[0, 0, 0], [4, 2, 3]]), abs=1e-12)
 
@@ -198,9 +198,9 @@ def test_rings_within_the_stated_error(folder, source):
         place = [float(getattr(grid, name).position(v)) for name, v in zip(sources.AXES, skin, strict=True)]
         mix = np.zeros((64, 4))
         for corner in np.ndindex(2, 2, 2):
-            at = [min(int(p) + c, n - 1) for p, c, n in zip(place, corner, grid.shape[::-1], strict=True)]
+            node = [min(int(p) + c, n - 1) for p, c, n in zip(place, corner, grid.shape[::-1], strict=True)]
             share = np.prod([p % 1 if c else 1 - p % 1 for p, c in zip(place, corner, strict=True)])
-            mix += share * rows[at[0] + grid.shape[2] * (at[1] + grid.shape[1] * at[2])]
+            mix += share * rows[node[0] + grid.shape[2] * (node[1] + grid.shape[1] * node[2])]
         own = source.luts.profile(*skin, space="srgb")
         seen = mix[:, 0] >= 0.01
         worst = max(worst, np.abs(mix[seen, 1:] - within(own, mix[seen, 0])).max())
@@ -235,12 +235,12 @@ def test_unreals_formula_gives_our_radius_back(folder, source):
     profiles = json.loads((folder / "unreal/lutgen.json").read_text())["subsurface_profiles"]
     assert len(profiles) == len(source.presets) == 9
     for values, preset in zip(profiles.values(), source.presets, strict=True):
-        found = unreal_d_mm(values)
+        d_mm = unreal_d_mm(values)
         # A step of the stored path, 500/65536 mm, is 0.22 um of d at a scale of 0.1; the scale's own step is 0.05 %.
         ours = preset.burley_d_mm
-        assert np.abs(found - ours).max() <= 2.2e-4 + 6e-4 * ours.max()
-        assert np.allclose(half_radius_mm(found), half_radius_mm(ours), rtol=6e-4, atol=1.55 * 2.2e-4)
-        assert np.allclose(2.5 * found, 2.5 * ours, rtol=6e-4, atol=2.5 * 2.2e-4)
+        assert np.abs(d_mm - ours).max() <= 2.2e-4 + 6e-4 * ours.max()
+        assert np.allclose(half_radius_mm(d_mm), half_radius_mm(ours), rtol=6e-4, atol=1.55 * 2.2e-4)
+        assert np.allclose(2.5 * d_mm, 2.5 * ours, rtol=6e-4, atol=2.5 * 2.2e-4)
         assert values["ior"] == 1.4
         assert values["surface_albedo"] == pytest.approx(np.clip(preset.linear_srgb, 0.009, 1))
 
@@ -283,8 +283,8 @@ def test_the_same_set_gives_the_same_bytes_and_guids(folder, known, tmp_path):
             assert (out / path.relative_to(folder)).read_bytes() == path.read_bytes(), path.name
     metas = sorted((folder / "unity").rglob("*.meta"))
     guids = [re.findall(r"^guid: ([0-9a-f]{32})$", path.read_text(), re.MULTILINE) for path in metas]
-    assert all(len(one) == 1 for one in guids)
-    assert len({one[0] for one in guids}) == len(metas) == 7
+    assert all(len(guid) == 1 for guid in guids)
+    assert len({guid[0] for guid in guids}) == len(metas) == 7
     for path in metas:  # a file for each, and the same GUID for another set: references outlive an export
         assert path.with_suffix("").exists()
         other = (known / "unity" / path.relative_to(folder / "unity")).read_text()
@@ -340,9 +340,9 @@ def unity_graph(folder) -> str:
         "struct UnityTexture2D { Texture2D tex; SamplerState samplerstate; };\n"
         + (folder / "unity/lutgen.hlsl").read_text()
         + "float3 skin_color(float3 skin) { UnityTexture3D lut; lut.tex = Lut; lut.samplerstate = LutSampler;"
-        " float3 found; LutgenColor_float(lut, skin, found); return found; }\n"
+        " float3 color; LutgenColor_float(lut, skin, color); return color; }\n"
         "float4 skin_ring(float quantile, float3 skin) { UnityTexture2D p; p.tex = Profile; "
-        "p.samplerstate = LutSampler; float4 found; LutgenRing_float(p, quantile, skin, found); return found; }\n"
+        "p.samplerstate = LutSampler; float4 ring; LutgenRing_float(p, quantile, skin, ring); return ring; }\n"
     )
 
 
@@ -391,10 +391,10 @@ def shaded(glsl: str, volume: np.ndarray, rows: np.ndarray, wanted: np.ndarray) 
     gl.bind(program, **bound)
     target.use()
     array.render()
-    found = gl.read(target).reshape(-1, 4)
+    values = gl.read(target).reshape(-1, 4)
     gl.free(program, lut, profile, skins, corners, array, out, target)
     gl.check()
-    return found
+    return values
 
 
 @pytest.mark.parametrize(
@@ -411,9 +411,9 @@ def test_the_hlsl_compiles_and_reads_the_set(folder, source, tmp_path, text, tar
     glsl = compiled(text(folder), tmp_path)
     cells, rows = volume(folder / target), profile(folder / target)
     skins = source.skins
-    found = shaded(glsl, cells, rows, np.column_stack([skins, np.full(len(skins), -1.0)]))[:, :3]
+    colors = shaded(glsl, cells, rows, np.column_stack([skins, np.full(len(skins), -1.0)]))[:, :3]
     stated = json.loads((folder / "manifest.json").read_text())["export"]["error"][target]["color"]["largest"]
-    assert np.abs(found - source.luts.color(*skins.T)).max() <= stated + 3e-4  # 8 bits of weight in a GPU's filter
+    assert np.abs(colors - source.luts.color(*skins.T)).max() <= stated + 3e-4  # 8 bits of weight in a GPU's filter
     columns = np.random.default_rng(3).integers(0, 64, len(skins))
     rings = shaded(glsl, cells, rows, np.column_stack([skins, (columns + 0.5) / 64]))
     grid = source.luts.profile_lut.grid
@@ -426,12 +426,12 @@ def test_a_fixed_axis_stays_one_texel_thick(asymmetric, tmp_path):
     colors = ColorLut(replace(asymmetric.color_lut.grid, eumelanin=axis), asymmetric.color_lut.acescg[:, -1:])
     grid = replace(profile.grid, eumelanin=axis)
     shapes = replace(profile, grid=grid, shape=profile.shape[:, -1:], clamped_share=profile.clamped_share[:, -1:])
-    one = replace(asymmetric, color_lut=colors, profile_lut=shapes)
-    exports.export(one, ("unreal", "unity"), tmp_path / "out", None, False, lambda *_: None)
+    thin = replace(asymmetric, color_lut=colors, profile_lut=shapes)
+    exports.export(thin, ("unreal", "unity"), tmp_path / "out", None, False, lambda *_: None)
     for target, volume in (("unreal", unreal_volume), ("unity", unity_volume)):
-        found = volume(tmp_path / "out" / target)
-        assert found.shape == (COUNTS[2], 1, COUNTS[0], 3)
-        assert found[3, 0, 2] == pytest.approx([0.35, 0.6, 0.2875], abs=1e-3)
+        texels = volume(tmp_path / "out" / target)
+        assert texels.shape == (COUNTS[2], 1, COUNTS[0], 3)
+        assert texels[3, 0, 2] == pytest.approx([0.35, 0.6, 0.2875], abs=1e-3)
     for text in (unreal_nodes, unity_graph):
         assert "texture" in compiled(text(tmp_path / "out"), tmp_path)
 

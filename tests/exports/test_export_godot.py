@@ -143,11 +143,11 @@ def pixels(ran, name: str) -> np.ndarray:
 
 def unpacked(ran, name: str) -> np.ndarray:
     """Values [1000, 4] of a packing shader."""
-    found = np.zeros((WIDTH * HEIGHT, 4))
+    values = np.zeros((WIDTH * HEIGHT, 4))
     for channel in range(4):
         parts = [pixels(ran, f"{name}_{channel}_{part}") // 16 @ [256, 16, 1] for part in range(2)]
-        found[:, channel] = (parts[0] * 4096 + parts[1]) / 16777215
-    return found
+        values[:, channel] = (parts[0] * 4096 + parts[1]) / 16777215
+    return values
 
 
 def test_godot_loads_the_strip_as_a_volume(ran, source):
@@ -163,8 +163,8 @@ def test_godot_samples_what_the_luts_say(ran, source):
 
 def test_godots_rings_are_the_profiles(ran, source, quantiles):
     expected = rings(source, quantiles)
-    found = unpacked(ran, "ring") * [RADIUS_MM, 1, 1, 1]
-    assert np.all(np.abs(found - expected) <= HALF * expected + 5e-6)
+    read = unpacked(ran, "ring") * [RADIUS_MM, 1, 1, 1]
+    assert np.all(np.abs(read - expected) <= HALF * expected + 5e-6)
 
 
 def test_the_exported_shader_by_maps(ran, source):
@@ -186,12 +186,12 @@ def test_the_exported_material_shows_the_color(ran, source):
 
 def test_the_exported_scene_shows_every_preset(ran, source):
     """The middle of each sphere is its preset's color times what the scene's lights give there, plus gloss."""
-    found, picture = ran
+    scene, picture = ran
     assert picture.shape == (640, 640, 3)
-    assert set(found["places"]) == {preset.name for preset in source.presets}
+    assert set(scene["places"]) == {preset.name for preset in source.presets}
     key, rim = (np.array(v) / np.linalg.norm(v) for v in ((-0.6, 0.7, 0.8), (0.9, 0.2, -0.6)))
     for i, preset in enumerate(source.presets):
-        x, y = (round(v) for v in found["places"][preset.name])
+        x, y = (round(v) for v in scene["places"][preset.name])
         coded = picture[y - 1 : y + 2, x - 1 : x + 2].reshape(-1, 3).mean(axis=0) / 255
         seen = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
         normal = np.array([-0.26 * (i % 3 - 1), -0.26 * (1 - i // 3), 1.5])  # toward the camera

@@ -92,7 +92,7 @@ def test_three_js_samples_what_the_luts_say(read, source):
     """KTX2Loader, EXRLoader and LUTCubeLoader at 1,000 skins: half precision of the nodes, nothing else.
 
     Node errors of 2^-11 of a value, mixed with weights that sum to 1, are 2^-11 of the mixed value; floats add 1e-6.
-    The cube has floats and adds the resampling that the export states. SwiftShader filters with whole floats (found:
+    The cube has floats and adds the resampling that the export states. SwiftShader filters with whole floats (measured:
     3e-7 off the formula); a GPU's 8-bit filter weights may add 2^-9 of neighbors' differences, 3e-4 here.
     """
     assert read[0]["shape"] == [True, *source.grid.shape[::-1], "srgb-linear"]
@@ -107,10 +107,10 @@ def test_three_js_samples_what_the_luts_say(read, source):
 
 def test_the_glsl_reads_rings(read, source):
     """`lutgen_ring` mixes the table's nodes and columns; the widest channel's energy is the quantile that was asked."""
-    found, quantiles = values(read, "ring"), read[1]
+    ring, quantiles = values(read, "ring"), read[1]
     expected = rings(source, quantiles)
-    assert np.all(np.abs(found - expected) <= HALF * expected + 5e-6)
-    assert found[:, 1:].min(axis=1) == pytest.approx(np.clip(quantiles, 0.5 / 64, 63.5 / 64), abs=1e-5)
+    assert np.all(np.abs(ring - expected) <= HALF * expected + 5e-6)
+    assert ring[:, 1:].min(axis=1) == pytest.approx(np.clip(quantiles, 0.5 / 64, 63.5 / 64), abs=1e-5)
 
 
 @pytest.fixture(scope="module")
@@ -121,12 +121,12 @@ def shown(folder, tmp_path_factory):
 
 def test_the_page_follows_the_sliders(shown, folder, source):
     """Dragged by mouse, offline: the swatch on the screen is the LUTs' color within 2/255, and the note tells it."""
-    found, _ = shown
-    assert [url for url in found["asked"] if not url.startswith("file:")] == []
-    assert len(found["asked"]) == 1
+    page, _ = shown
+    assert [url for url in page["asked"] if not url.startswith("file:")] == []
+    assert len(page["asked"]) == 1
     assert (folder / "three/skin.html").stat().st_size < 1.5e6
-    skins = [step["skin"] for step in found["steps"]]
-    for step in found["steps"]:
+    skins = [step["skin"] for step in page["steps"]]
+    for step in page["steps"]:
         exact = 255 * color.encode_srgb(source.luts.color(*step["skin"]))
         assert np.abs(np.array(step["pixel"]) - exact).max() <= 2, step
         assert step["told"] == "#" + bytes(step["pixel"]).hex().upper()

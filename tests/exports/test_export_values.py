@@ -87,8 +87,8 @@ def test_shade_against_points_strewn_on_a_sphere(source):
         near = np.array([np.interp(0.2, edges, np.concatenate([[0], np.cumsum(preset.rings[:, c])])) for c in range(3)])
         total = near + density[ring].sum(axis=0) * area
         brute = (near * max(here[2], 0) + (density[ring] * lit[:, None]).sum(axis=0) * area) / total
-        found = preintegrated.shaded(preset.rings, edges, np.array(here[2]), np.array(curvature))
-        assert found == pytest.approx(brute, abs=4e-3)
+        shade = preintegrated.shaded(preset.rings, edges, np.array(here[2]), np.array(curvature))
+        assert shade == pytest.approx(brute, abs=4e-3)
 
 
 def test_transmission_falls_with_thickness_and_is_all_at_none(source):

@@ -83,14 +83,14 @@ def test_openimageio_reads_the_strips(folder, source):
         assert strip.shape == (N_h, N_e * N_m, 3)
         t = source.coordinates(source.skins)
         x, tile, y = t[:, 0] * (N_m - 1), t[:, 1] * (N_e - 1), t[:, 2] * (N_h - 1)
-        found = np.zeros((len(t), 3))
+        colors = np.zeros((len(t), 3))
         for dx, de, dy in np.ndindex(2, 2, 2):
             low = [np.minimum(v.astype(int), n - 2) for v, n in ((x, N_m), (tile, N_e), (y, N_h))]
             parts = zip((dx, de, dy), (x, tile, y), low, strict=True)
             weight = np.prod([v - k if d else 1 - v + k for d, v, k in parts], axis=0)
-            found += weight[:, None] * strip[low[2] + dy, (low[1] + de) * N_m + low[0] + dx]
+            colors += weight[:, None] * strip[low[2] + dy, (low[1] + de) * N_m + low[0] + dx]
         stated = added(folder)["exr"][name]["largest"]
-        assert np.abs(found - source.luts.color(*source.skins.T, space=space)).max() <= stated + 1e-6
+        assert np.abs(colors - source.luts.color(*source.skins.T, space=space)).max() <= stated + 1e-6
 
 
 def test_a_default_size_holds_the_sets_own_nodes(source):
@@ -104,8 +104,8 @@ def test_a_default_size_holds_the_sets_own_nodes(source):
 def test_a_fixed_axis_becomes_a_cube_too(tmp_path, source):
     luts, grid = source.luts, source.grid
     fixed = replace(grid, eumelanin=Axis("eumelanin", "1", 1.0, 1.0, 1))
-    one = replace(luts, color_lut=ColorLut(fixed, luts.color_lut.acescg[:, -1:]))
-    exports.export(one, ("cube",), tmp_path / "out", 5, False, lambda *_: None)
+    thin = replace(luts, color_lut=ColorLut(fixed, luts.color_lut.acescg[:, -1:]))
+    exports.export(thin, ("cube",), tmp_path / "out", 5, False, lambda *_: None)
     rows = [line for line in (tmp_path / "out/cube/skin.cube").read_text().splitlines() if line[0].isdigit()]
     assert len(rows) == 125
     cube = np.array([[float(v) for v in row.split()] for row in rows]).reshape(5, 5, 5, 3)
@@ -129,8 +129,8 @@ def test_a_fixed_axis_becomes_a_cube_too(tmp_path, source):
 def test_bad_input_is_one_line(arguments, message, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "here").mkdir()
-    given = arguments if "--out" in arguments else [*arguments, "--out", "out"]
-    assert main(["export", *given]) == 2
+    options = arguments if "--out" in arguments else [*arguments, "--out", "out"]
+    assert main(["export", *options]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1

@@ -3,6 +3,7 @@
 import importlib
 import json
 import shutil
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,8 @@ from lutgen.scene.look import Look
 _NAMES = "app", "gl", "passes", "stage", "textures"
 app, gl, passes, stages, textures = (importlib.import_module(f"lutgen.viewer.{n}") for n in _NAMES)
 SIZE = (160, 160)
+FOURFOLD = np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4")
+"""Ratios of a map: four times the slider's melanin."""
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +48,15 @@ def plain():
     made = app.open_stage(lutgen.load(), square, Maps(), SIZE)
     yield made
     stages.release(made)
+
+
+@contextmanager
+def one_map(stage, name: str, values: np.ndarray):
+    """The stage with another map [rows, columns, channels] of that name."""
+    own, stage.maps[name] = stage.maps[name], gl.image(values)
+    yield
+    stage.maps[name].release()
+    stage.maps[name] = own
 
 
 def face(stage, look) -> np.ndarray:
@@ -105,13 +117,12 @@ def test_where_the_sky_is_hidden_light_comes_from_skin(plain):
     look = Look(entry=0, light=0, azimuth=0, specular=0, distance_mm=300, environment=1, transmission=0)
     c = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg")
     stages.set_environment(plain, np.full((8, 16, 3), 0.6))
-    stages.set_map(plain, "surface", surface)
-    found = linear(plain, look)[140:180, 140:180]
-    behind = linear(plain, replace(look, light=4.0, light_azimuth=180, light_elevation=0))[160, 160]
-    stages.set_map(plain, "surface", None)
+    with one_map(plain, "surface", surface):
+        even = linear(plain, look)[140:180, 140:180]
+        behind = linear(plain, replace(look, light=4.0, light_azimuth=180, light_elevation=0))[160, 160]
     stages.set_environment(plain, None)
-    assert np.abs(found / (0.6 * c * (1 / 2 + c / 4)) - 1).max() < 0.01  # harmonics of 8 rows
-    assert behind - found[20, 20] == pytest.approx(c * c / 4 * lighting.SUN / np.pi, rel=0.01)
+    assert np.abs(even / (0.6 * c * (1 / 2 + c / 4)) - 1).max() < 0.01  # harmonics of 8 rows
+    assert behind - even[20, 20] == pytest.approx(c * c / 4 * lighting.SUN / np.pi, rel=0.01)
 
 
 def test_an_exr_holds_the_radiance_behind_the_picture(plain, stage, tmp_path):
@@ -155,18 +166,16 @@ def test_thin_parts_let_light_through(plain):
     for thickness in (1.0, 31.0):
         surface = np.ones((1, 1, 4), "f4")
         surface[..., 3] = thickness / 32
-        stages.set_map(plain, "surface", surface)
-        seen.append(linear(plain, look)[160, 160])
-    stages.set_map(plain, "surface", None)
+        with one_map(plain, "surface", surface):
+            seen.append(linear(plain, look)[160, 160])
     assert seen[0][0] > 5 * seen[0][2] > 0
     assert seen[1].max() < 0.01 * seen[0][0]
 
 
 def test_maps_change_the_skin_where_they_are(plain):
     base = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
-    stages.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
-    darker = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
-    stages.set_map(plain, "chromophores", None)
+    with one_map(plain, "chromophores", FOURFOLD):
+        darker = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
     again = linear(plain, Look(azimuth=0, elevation=0, distance_mm=300))
     assert np.all(darker[100:200, 100:200] < 0.9 * base[100:200, 100:200])
     assert np.array_equal(again, base)
@@ -175,16 +184,15 @@ def test_maps_change_the_skin_where_they_are(plain):
 def test_maps_fade_on_skin_darker_than_they_were_painted_for(plain):
     """By the power .38 of how much darker: a ratio of 4 at half of full contrast's melanin is 4^(2^-.38)."""
     look = Look(melanin=0.04, azimuth=0, elevation=0, distance_mm=300, tier="off", transmission=0)
-    stages.set_map(plain, "chromophores", np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4"))
-    made = {}
-    for full in (0.04, 0.02):
-        plain.full_contrast_melanin = full
-        linear(plain, look)
-        made[full] = gl.read(plain.targets["surface_buffer"], attachment=2)[160, 160, 0]
+    melanin = {}
+    with one_map(plain, "chromophores", FOURFOLD):
+        for full in (0.04, 0.02):
+            plain.full_contrast_melanin = full
+            linear(plain, look)
+            melanin[full] = gl.read(plain.targets["surface_buffer"], attachment=2)[160, 160, 0]
     plain.full_contrast_melanin = 0.0292
-    stages.set_map(plain, "chromophores", None)
-    assert made[0.04] == pytest.approx(0.16, rel=2e-3)
-    assert made[0.02] == pytest.approx(0.04 * 4 ** (0.5**0.38), rel=2e-3)
+    assert melanin[0.04] == pytest.approx(0.16, rel=2e-3)
+    assert melanin[0.02] == pytest.approx(0.04 * 4 ** (0.5**0.38), rel=2e-3)
 
 
 def test_oxygenation_reaches_the_textures_in_time(stage):

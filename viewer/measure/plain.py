@@ -14,7 +14,7 @@ from lutgen.scene import look as looks
 from lutgen.scene.look import Look
 
 from .. import gl, light, passes
-from .. import stage as stages
+from ..stage import Stage
 from . import clock
 
 
@@ -28,7 +28,7 @@ class Plain:
     target: moderngl.Framebuffer
 
 
-def open_plain(stage: stages.Stage, look: Look) -> Plain:
+def open_plain(stage: Stage, look: Look) -> Plain:
     """The color of a look's skin in a texture, and the program that reads it."""
     context = gl.context()
     made = {"constants.glsl": "#define PLAIN_ALBEDO\n" + light.constants()}
@@ -39,7 +39,7 @@ def open_plain(stage: stages.Stage, look: Look) -> Plain:
     return Plain(program, head, _bake(stage, look), target)
 
 
-def _bake(stage: stages.Stage, look: Look) -> moderngl.Texture:
+def _bake(stage: Stage, look: Look) -> moderngl.Texture:
     """The LUT's color at each texel of the largest map, 8 bits, filtered as the maps are."""
     passes.set_oxygenation(stage, look.oxygenation)
     tables = stage.sides["none"].textures
@@ -63,7 +63,7 @@ def _bake(stage: stages.Stage, look: Look) -> moderngl.Texture:
     return gl.filtered(albedo)
 
 
-def draw(stage: stages.Stage, plain: Plain, look: Look) -> None:
+def draw(stage: Stage, plain: Plain, look: Look) -> None:
     """Draw one frame into the stage's pixels, on its clock; the stage keeps the size that it had."""
     clock.start(stage.timer)
     with clock.timed(stage.timer, "shadow"):

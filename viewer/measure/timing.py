@@ -15,7 +15,7 @@ from lutgen.scene.look import Look
 from lutgen.tables.lut_set import LutSet
 
 from .. import app, gl, passes
-from .. import stage as stages
+from ..stage import Stage, release
 from . import plain
 
 ROUNDS = 5
@@ -50,11 +50,11 @@ def report(
             "lut_bytes": stage.sides["none"].textures.bytes,
         }  # fmt: skip
     finally:
-        stages.release(stage)
+        release(stage)
 
 
 def costs(
-    stage: stages.Stage,
+    stage: Stage,
     look: Look,
     tiers: Sequence[str] = looks.TIERS,
     rounds: int = ROUNDS,
@@ -88,7 +88,7 @@ def costs(
     return _cost("plain", 0, 1, taken["plain"], [1.0]), drawn
 
 
-def _frame(stage: stages.Stage, draw: Callable[[], None]) -> dict[str, float]:
+def _frame(stage: Stage, draw: Callable[[], None]) -> dict[str, float]:
     stage.cast = None  # as if the light moved
     draw()
     gl.context().finish()
@@ -101,7 +101,7 @@ def _cost(name: str, taps: int, frames: int, found: list[dict[str, float]], rati
     return Cost(name, taps, frames, each, total, float(np.median(ratios)), (min(ratios), max(ratios)))
 
 
-def oxygenation(stage: stages.Stage, rounds: int = ROUNDS) -> float:
+def oxygenation(stage: Stage, rounds: int = ROUNDS) -> float:
     """Median milliseconds from another oxygenation to its LUTs on the GPU: expansion, tables and upload together."""
     before, taken = stage.oxygenation, []
     for value in np.linspace(0.3, 0.9, rounds + 1):

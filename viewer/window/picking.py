@@ -10,7 +10,7 @@ from lutgen.scene.look import Look
 from lutgen.solvers.profiles import Profile
 from lutgen.tables import expand
 
-from .. import stage as stages
+from ..stage import SAMPLES, Stage, side
 
 
 @dataclass(frozen=True)
@@ -28,16 +28,16 @@ class Picked:
     profile: Profile
 
 
-def pick(stage: stages.Stage, look: Look, x: int, y: int) -> Picked | None:
+def pick(stage: Stage, look: Look, x: int, y: int) -> Picked | None:
     """The skin at pixel x, y of the picture that was drawn last (0, 0 is its top left); None where there is none."""
     width, height = stage.size
     if not (0 <= x < width and 0 <= y < height):
         return None
-    place = x * stages.SAMPLES, (height - 1 - y) * stages.SAMPLES, 1, 1
+    place = x * SAMPLES, (height - 1 - y) * SAMPLES, 1, 1
     raw = stage.targets["surface_buffer"].read(viewport=place, components=4, attachment=2, dtype="f4")
     *skin, thickness_mm = (float(v) for v in np.frombuffer(raw, "f4"))
     right = look.split != "none" and x >= width // 2
-    luts = stages.side(stage, look.split if right else "none").shown
+    luts = side(stage, look.split if right else "none").shown
     if skin[0] <= 0:
         return None
     grid = luts.color_lut.grid

@@ -17,7 +17,7 @@ from lutgen.scene.look import Look
 from lutgen.skin.tissue import PRESETS
 
 from .. import app, gl, passes
-from .. import stage as stages
+from ..stage import Stage, release, resize
 from . import imgui_draw, panel, picking
 
 KEYS = {
@@ -37,7 +37,7 @@ class State:
 
     look: Look
     start: Look
-    stage: stages.Stage
+    stage: Stage
     notes: tuple[str, ...]
     panel: panel.Panel = field(default_factory=panel.Panel)
     mouse: tuple[float, float] = (0.0, 0.0)
@@ -48,7 +48,7 @@ class State:
 
 
 def run(
-    opened: Callable[[tuple[int, int]], stages.Stage], look: Look, size: tuple[int, int], notes: tuple[str, ...] = ()
+    opened: Callable[[tuple[int, int]], Stage], look: Look, size: tuple[int, int], notes: tuple[str, ...] = ()
 ) -> Look:
     """Open a window whose picture has that size, until it is closed; the look at its end.
 
@@ -72,7 +72,7 @@ def run(
             since = now
             glfw.swap_buffers(window)
         imgui_draw.close(drawer)
-        stages.release(state.stage)
+        release(state.stage)
         gl.free(copy.array, copy.program, copy.corners)
         gl.check()
         return state.look
@@ -123,7 +123,7 @@ def _frame(window, state: State, drawer: imgui_draw.Overlay, copy: gl.Pass, seco
                              lambda path: app.write(passes.pixels(state.stage), path))  # fmt: skip
     state.awake = AWAKE if state.look != before else max(state.awake - 1, 0)
     if state.stage.size != size:
-        stages.resize(state.stage, size)
+        resize(state.stage, size)
         state.drawn = None
     if state.drawn != state.look:
         try:
