@@ -75,8 +75,8 @@ def read(path: Path) -> tuple[np.ndarray, bool]:
     EXR and 32-bit float TIFF hold values; 8- and 16-bit pictures texels: gray, palette or color, with alpha or without,
     of any size. InputError for anything else, and for NaN.
     """
-    found = images.read(path, "map")
-    return found.values[::-1].astype(float), found.bits == 32
+    image = images.read(path, "map")
+    return image.values[::-1].astype(float), image.bits == 32
 
 
 def load(folder: Path, under: Maps | None = None) -> Maps:

@@ -50,37 +50,38 @@ def read(path: Path | str, encoding: str | None = None) -> Albedo:
 
     InputError for no picture, and for one that is gray, black or clear throughout, or holds NaN or negative values.
     """
-    found = images.read(Path(path), "albedo")
-    usual = "linear" if found.bits == 32 else "srgb"
+    image = images.read(path, "albedo")
+    values, alpha = image.values, image.alpha
+    usual = "linear" if image.bits == 32 else "srgb"
     encoding = usual if encoding is None else one_of("encoding", encoding, ENCODINGS)
     gray = f"albedo {path}: is gray; melanin and hemoglobin can only be told from color, give a color picture"
-    if found.values.shape[-1] != 3:
+    if values.shape[-1] != 3:
         raise InputError(gray)
-    if found.values.min() < 0:
-        raise InputError(f"albedo {path}: holds negative values, down to {found.values.min():g}; mend it")
-    linear = color.decode_srgb(found.values) if encoding == "srgb" else _linear(found, path)
-    clear = None if found.alpha is None else found.alpha > 0
-    if clear is not None and not clear.any():
+    if values.min() < 0:
+        raise InputError(f"albedo {path}: holds negative values, down to {values.min():g}; mend it")
+    linear = color.decode_srgb(values) if encoding == "srgb" else _linear(image, path)
+    covered = None if alpha is None else alpha > 0
+    if covered is not None and not covered.any():
         raise InputError(f"albedo {path}: is clear throughout (alpha 0); there is no skin to invert")
     try:
-        _, painted = checked(linear, clear)
+        _, painted = checked(linear, covered)
     except InputError as error:
         raise InputError(f"albedo {path}: {str(error).removeprefix('albedo ')}") from error
-    some = linear[painted]
-    if np.mean(some.max(axis=1) - some.min(axis=1) > _COLORLESS * some.max(axis=1)) < 0.01:
+    texels = linear[painted]
+    if np.mean(np.ptp(texels, axis=1) > _COLORLESS * texels.max(axis=1)) < 0.01:
         raise InputError(gray)
-    return Albedo(linear, found.alpha, painted, encoding, usual, found.bits)
+    return Albedo(linear, alpha, painted, encoding, usual, image.bits)
 
 
-def _linear(found: images.Picture, path: Path | str) -> np.ndarray:
+def _linear(image: images.Image, path: Path | str) -> np.ndarray:
     """Linear sRGB [R, C, 3] of linear texels; what lies outside sRGB is brought to its edge."""
     from lutgen.files import exr
 
-    if found.chromaticities is None or np.allclose(found.chromaticities, exr.REC709, atol=1e-3):
-        return np.ascontiguousarray(found.values, "f4")
-    if not np.allclose(found.chromaticities, exr.ACESCG, atol=1e-3):
+    if image.chromaticities is None or np.allclose(image.chromaticities, exr.REC709, atol=1e-3):
+        return np.ascontiguousarray(image.values, "f4")
+    if not np.allclose(image.chromaticities, exr.ACESCG, atol=1e-3):
         raise InputError(f"albedo {path}: has other primaries than Rec. 709 and ACEScg; convert it to linear Rec. 709")
-    return np.maximum(color.from_acescg(found.values, "srgb"), 0).astype("f4")
+    return np.maximum(color.from_acescg(image.values, "srgb"), 0).astype("f4")
 
 
 def doubt(luts: LutSet, albedo: Albedo) -> str | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lutgen.errors import InputError, MachineError, in_range
+from lutgen.files import images
 
 SUFFIXES = (".glb", ".gltf", ".obj")
 HEAD_MM, BUST_MM = 250.0, 380.0
@@ -176,8 +177,6 @@ def scan(name: str) -> Mesh:
 
 def _scanned(known: dict, path: Path, mm_per_unit: float | None, pictures: dict[str, Path] | None = None) -> Mesh:
     """A known scan from its file, with its pictures from where they are said to be or from beside it."""
-    from PIL import Image
-
     shape = load(path, known["mm_per_unit"] if mm_per_unit is None else mm_per_unit, known["flip_v"])
     found, notes = {}, list(shape.notes)
     for part, short in _SHORT_NAMES.items():
@@ -188,8 +187,7 @@ def _scanned(known: dict, path: Path, mm_per_unit: float | None, pictures: dict[
         if place is None:
             notes.append(f"the scan's {part} map does not lie beside it ({short} or {Path(url).name}): left out")
             continue
-        with Image.open(place) as image:
-            found[part] = np.asarray(image.convert("RGB"))[::-1].copy()
+        found[part] = images.read(place, "picture").pixels[::-1].copy()
     return replace(shape, textures=found, notes=tuple(notes), attribution=known["attribution"])
 
 

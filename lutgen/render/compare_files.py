@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from lutgen import color
 from lutgen.errors import InputError
-from lutgen.files import exr
+from lutgen.files import exr, images
 from lutgen.render import film as rendered
 
 COVERED = 0.99
@@ -37,14 +36,13 @@ def read(path: Path | str) -> Picture:
 
     EXR: R, G and B linear, in ACEScg where the file says so, else Rec. 709; `mask`, or else A, the share of skin; noise
     from the moments that `lutgen render` keeps, or from `sigma.R`, `sigma.G`, `sigma.B` as if channels erred each by
-    itself. Other formats: 8-bit sRGB, A the share of skin. Raises InputError for a file that is missing or no picture,
-    and for NaN or infinite values.
+    itself. Texels of 8 or 16 bits: sRGB, A the share of skin. Raises InputError for a file that is missing or no
+    picture, and for NaN or infinite values.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"picture {path}: there is no such file")
-    found = _exr(path) if path.suffix.lower() == ".exr" else _display(path)
-    for what, values in (("", found.acescg), (" in its noise", found.covariance), (" in its mask", found.skin)):
+    image = images.read(path, "picture", finite=False)
+    picture = _linear(image, path) if image.bits == 32 else _display(image, path.name)
+    for what, values in (("", picture.acescg), (" in its noise", picture.covariance), (" in its mask", picture.skin)):
         broken = np.zeros((1, 1), bool) if values is None else ~np.isfinite(values)
         if broken.any():
             row, column = np.argwhere(broken)[0][:2]
@@ -52,14 +50,12 @@ def read(path: Path | str) -> Picture:
                 f"picture {path}: holds {int(broken.sum())} NaN or infinite values{what}, the first at row {row}, "
                 f"column {column}; render it anew"
             )
-    return found
+    return picture
 
 
-def _exr(path: Path) -> Picture:
-    try:
-        part = next(iter(exr.read(path).values()))
-    except InputError as error:
-        raise InputError(f"picture {path}: not a whole OpenEXR file") from error
+def _linear(image: images.Image, path: Path) -> Picture:
+    """A picture of floats."""
+    part = image.part or exr.Part("", {"Y": image.values[..., 0]}, {})  # of floats Pillow reads gray ones only
     channels = part.channels
     shapes = {values.shape for values in channels.values()}
     if not set("RGB") <= set(channels) or len(shapes) != 1:
@@ -72,7 +68,7 @@ def _exr(path: Path) -> Picture:
         return Picture(path.name, rgb, covariance, skin, notes, seed)
     if not np.allclose(part.chromaticities, exr.REC709, atol=1e-4):
         raise InputError(f"picture {path}: has other primaries than ACEScg and Rec. 709; convert it")
-    return Picture(path.name, color.to_acescg(rgb), None, skin)
+    return Picture(path.name, color.tocolor.to_acescg(rgb), None, skin)
 
 
 def _noise(part: exr.Part, rgb: np.ndarray, path: Path) -> tuple[np.ndarray | None, tuple[str, ...]]:
@@ -90,22 +86,13 @@ def _noise(part: exr.Part, rgb: np.ndarray, path: Path) -> tuple[np.ndarray | No
     return covariance, (f"{path.name}: noise of its channels is taken to be independent",)
 
 
-def _display(path: Path) -> Picture:
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path) as image:
-                seen = image.has_transparency_data
-                encoded = np.asarray(image.convert("RGBA"), "f8") / 255
-    except UnidentifiedImageError as error:
-        raise InputError(f"picture {path}: is no picture; an EXR or PNG is needed") from error
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InputError(f"picture {path}: cannot be read ({error})") from error
-    note = f"{path.name}: 8-bit sRGB, so a tone curve in it counts as difference"
-    skin = encoded[..., 3] if seen else None
-    return Picture(path.name, color.to_acescg(color.decode_srgb(encoded[..., :3])), None, skin, (note,))
+def _display(image: images.Image, name: str) -> Picture:
+    """A picture of texels, as a display shows it."""
+    srgb = images.as_floats(image.pixels, "f8")
+    colors = np.broadcast_to(srgb[..., :-1] if image.has_alpha else srgb, (*srgb.shape[:2], 3))
+    note = f"{name}: {image.bits}-bit sRGB, so a tone curve in it counts as difference"
+    skin = srgb[..., -1] if image.has_alpha else None
+    return Picture(name, color.to_acescg(color.decode_srgb(colors)), None, skin, (note,))
 
 
 def mask(a: Picture, b: Picture) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -12,9 +12,9 @@ import numpy as np
 
 from lutgen import color
 from lutgen.errors import InputError
-from lutgen.files import exr, hdr
+from lutgen.files import images
 
-SUFFIXES = (".exr", ".hdr", ".pic")
+SUFFIXES = (".exr", *images.RADIANCE)
 MOST = 1e9
 """Radiance of a texel at most; a sun in an unclipped picture is about 1e5 times its sky."""
 ROWS = 256
@@ -33,9 +33,11 @@ def read(path: Path) -> np.ndarray:
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"environment = {path}: allowed is studio, none or a file ending in {', '.join(SUFFIXES)}")
-    if not path.is_file():
-        raise InputError(f"environment {path}: there is no such file")
-    radiance = _exr(path) if path.suffix.lower() == ".exr" else hdr.read(path)
+    image = images.read(path, "environment", finite=False, radiance=True)
+    if image.part is not None and not set("RGB") <= set(image.part.channels):
+        channels = ", ".join(image.part.channels)
+        raise InputError(f"environment {path}: has channels {channels}; R, G and B are needed")
+    radiance = image.values.astype(float)
     rows, columns = radiance.shape[:2]
     if columns != 2 * rows:
         raise InputError(f"environment {path}: is {columns} x {rows}; a picture of all around is twice as wide as high")
@@ -47,16 +49,6 @@ def read(path: Path) -> np.ndarray:
         most = f"{radiance.max():g}; allowed is 0 to {MOST:g}"
         raise InputError(f"environment {path}: holds a radiance of {most}; scale it down")
     return np.maximum(color.to_acescg(radiance), 0.0)
-
-
-def _exr(path: Path) -> np.ndarray:
-    try:
-        part = next(iter(exr.read(path).values()))
-    except InputError as error:
-        raise InputError(f"environment {path}: not a whole OpenEXR file") from error
-    if not set("RGB") <= set(part.channels):
-        raise InputError(f"environment {path}: has channels {', '.join(part.channels)}; R, G and B are needed")
-    return part.stack("RGB").astype("f8")
 
 
 def directions(rows: int) -> tuple[np.ndarray, np.ndarray]:

@@ -238,7 +238,7 @@ def test_bad_input_is_one_line_that_names_it(tmp_path, capsys):
     assert "skin by half" in refused(capsys, write(tmp_path / "t.exr", scene(), mask=thin), good)
     (tmp_path / "text.png").write_text("no picture")
     (tmp_path / "text.exr").write_text("no picture")
-    assert "is no picture" in refused(capsys, good, tmp_path / "text.png")
+    assert "not a picture that can be read" in refused(capsys, good, tmp_path / "text.png")
     assert "not a whole OpenEXR file" in refused(capsys, good, tmp_path / "text.exr")
     exr.write(tmp_path / "y.exr", [exr.Part("y", {"Y": np.ones((8, 8), "f4")}, {})])
     assert "R, G and B" in refused(capsys, good, tmp_path / "y.exr")

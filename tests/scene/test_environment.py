@@ -7,7 +7,7 @@ import pytest
 
 import lutgen
 from lutgen.cli import main
-from lutgen.files import exr, hdr
+from lutgen.files import exr, images
 from lutgen.files.texture_maps import Maps
 from lutgen.head.mesh import Mesh
 from lutgen.scene import environment, light, subject
@@ -64,10 +64,10 @@ def scene_of(rows: int = 16) -> np.ndarray:
 def test_a_radiance_picture_comes_back(tmp_path, runs):
     picture = scene_of()
     write_hdr(tmp_path / "a.hdr", picture, runs)
-    found = hdr.read(tmp_path / "a.hdr")
+    found = images.read(tmp_path / "a.hdr", "environment", radiance=True).values
     assert np.abs(found / picture - 1).max() < 0.5 / 64  # half of a mantissa's last step, in the darkest channel
     write_hdr(tmp_path / "b.hdr", picture, runs, "EXPOSURE=2\nFORMAT=32-bit_rle_rgbe\nEXPOSURE= 4.0\n")
-    assert hdr.read(tmp_path / "b.hdr") == pytest.approx(found / 8)
+    assert images.read(tmp_path / "b.hdr", "environment", radiance=True).values == pytest.approx(found / 8)
 
 
 def test_both_formats_give_the_same_light_in_acescg(tmp_path):
