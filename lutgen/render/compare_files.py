@@ -68,7 +68,7 @@ def _linear(image: images.Image, path: Path) -> Picture:
         return Picture(path.name, rgb, covariance, skin, notes, seed)
     if not np.allclose(part.chromaticities, exr.REC709, atol=1e-4):
         raise InputError(f"picture {path}: has other primaries than ACEScg and Rec. 709; convert it")
-    return Picture(path.name, color.tocolor.to_acescg(rgb), None, skin)
+    return Picture(path.name, color.to_acescg(rgb), None, skin)
 
 
 def _noise(part: exr.Part, rgb: np.ndarray, path: Path) -> tuple[np.ndarray | None, tuple[str, ...]]:

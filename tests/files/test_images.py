@@ -102,6 +102,16 @@ def test_a_layer_of_exr_is_a_color(tmp_path):
     assert found.chromaticities == pytest.approx(exr.REC709)
 
 
+def test_plain_channels_come_before_layers_and_the_first_part_before_others(tmp_path):
+    plain, layer, other = (np.full((2, 3, 3), value, "f4") for value in (0.2, 0.5, 0.8))
+    channels = exr.rgb(plain) | {f"Albedo.{name}": layer[..., i].copy() for i, name in enumerate("RGB")}
+    exr.write(tmp_path / "a.exr", [exr.Part("a", channels, {}), exr.Part("b", exr.rgb(other), {})])
+    image = images.read(tmp_path / "a.exr", "map")
+    assert np.array_equal(image.values, plain)
+    assert image.part is not None
+    assert len(image.part.channels) == 6
+
+
 def test_a_cut_exr_is_one_line_and_openexr_says_nothing_beside_it(tmp_path, capfd):
     exr.write(
         tmp_path / "a.exr", [exr.Part("a", exr.rgb(np.random.default_rng(0).random((64, 64, 3)).astype("f4")), {})]

@@ -10,7 +10,7 @@ from PIL import Image
 from lutgen import color
 from lutgen.cli import main
 from lutgen.errors import InputError
-from lutgen.files import exr
+from lutgen.files import exr, images
 from lutgen.render import compare, compare_files, compare_picture, film
 from lutgen.render.compare_files import Picture
 
@@ -179,6 +179,14 @@ def test_the_same_colors_in_acescg_rec709_and_png_do_not_differ(tmp_path):
     read = [compare_files.read(path) for path in files]
     for one in read[1:]:
         assert compare.compare(read[0], one).most < 1e-3
+
+
+def test_every_one_of_16_bits_is_compared(tmp_path):
+    encoded = np.random.default_rng(7).integers(40 << 8, 1 << 16, (16, 16, 3)) / 65535
+    images.write_16_bit(tmp_path / "a.png", encoded)
+    found = compare_files.read(tmp_path / "a.png")
+    assert np.array_equal(found.acescg, color.to_acescg(color.decode_srgb(encoded)))
+    assert found.notes[0] == "a.png: 16-bit sRGB, so a tone curve in it counts as difference"
 
 
 def same(found, expected, relative: float) -> bool:
