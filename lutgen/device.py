@@ -18,12 +18,14 @@ from types import ModuleType
 
 import numpy as np
 
-from lutgen.errors import InputError, MachineError
+from lutgen.errors import InputError, MachineError, shown
 
 INSTALL_HINT = (
     'install a CPU runtime with `pip install "lutgen[cpu]"` (x86-64 Linux), Debian\'s `pocl-opencl-icd`, '
     "or your GPU vendor's OpenCL driver"
 )
+LANES = (1, 4, 8, 16)
+"""Widths that kernels are built for."""
 _BUILD_OPTIONS = ["-cl-mad-enable"]  # not -cl-fast-relaxed-math: its Newton steps are slower than the divider
 
 
@@ -77,9 +79,15 @@ def _opencl() -> ModuleType:
 
 
 def _lanes(cl: ModuleType, device) -> int:
+    """What a CPU's vector unit holds (16 with AVX-512, 8 with AVX2), or LUTGEN_LANES; 1 on a GPU."""
     if not device.type & cl.device_type.CPU:
         return 1
-    return max(w for w in (1, 4, 8, 16) if w <= max(device.native_vector_width_float, 4))
+    asked = os.environ.get("LUTGEN_LANES", "")
+    if not asked:
+        return max(width for width in LANES if width <= max(device.native_vector_width_float, 4))
+    if asked not in map(str, LANES):
+        raise InputError(f"LUTGEN_LANES = {shown(asked)}: allowed is {', '.join(map(str, LANES))}, or unset")
+    return int(asked)
 
 
 @cache
