@@ -14,14 +14,21 @@ from lutgen.tables import expand
 
 LIMIT = 16384
 """Texels along a side of a texture, in both engines."""
-N = 1.4
-"""Refractive index of skin; Unreal's default is 1.55."""
 
 
 def slices(cells: np.ndarray) -> np.ndarray:
     """An image [N_e, N_h N_m, C] of cells [N_h, N_e, N_m, C]: a tile per hemoglobin from left to right, in it melanin
     along x and eumelanin along y, row 0 the lowest."""
     return cells.transpose(1, 0, 2, 3).reshape(cells.shape[1], -1, cells.shape[-1])
+
+
+def capitalized(preset: str) -> str:
+    """A preset's name as a part of an asset's.
+
+    >>> capitalized("very-light")
+    'VeryLight'
+    """
+    return "".join(word.capitalize() for word in preset.split("-"))
 
 
 def fits(engine: str, what: str, image: np.ndarray) -> np.ndarray:

@@ -80,7 +80,10 @@ def shader_text(source: Source) -> str:
         sliders.append(f"uniform float {name}{span} = {float(value)};")
     text = files("lutgen.exports").joinpath("templates", SHADER).read_text(encoding="utf-8")
     functions = lookup.text(source, "gdshader").strip()
-    return text.replace("/*SLIDERS*/", "\n".join(sliders)).replace("/*FUNCTIONS*/", functions)
+    parts = {"SLIDERS": "\n".join(sliders), "FUNCTIONS": functions, "SPECULAR": f"{(1 - source.entry) / 0.08:.3g}"}
+    for name, part in parts.items():
+        text = text.replace(f"/*{name}*/", part)
+    return text
 
 
 def material(preset: Preset) -> str:

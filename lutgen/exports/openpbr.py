@@ -1,8 +1,8 @@
 """A MaterialX document with an OpenPBR surface per preset: subsurface color, radius and scale.
 
 OpenPBR's subsurface is a medium: `subsurface_radius` times `subsurface_radius_scale` is its mean free path, its albedo
-follows from `subsurface_color`. The mean free path whose searchlight profile is Burley's shape of length d is
-d (1.85 - A + 7 |A - 0.8|^3) for a surface of albedo A (Christensen & Burley 2015, equation 5).
+follows from `subsurface_color`: the mean free path whose profile is the preset's Burley shape is
+`burley.mean_free_path_mm`.
 """
 
 from __future__ import annotations
@@ -12,21 +12,20 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from lutgen.exports.resampled import ENTRY, MADE, Preset, Report, Source
+from lutgen.exports.resampled import MADE, Preset, Report, Source
+from lutgen.solvers import burley
 
 FILE = "skin.mtlx"
-N = 1.4
 
 
 def subsurface_color(preset: Preset) -> np.ndarray:
     """Albedo [3] under the dielectric, which the renderer puts over it itself: the color without the entry."""
-    return np.clip(preset.linear_srgb / ENTRY, 0, 1)
+    return np.clip(preset.linear_srgb / preset.entry, 0, 1)
 
 
 def mean_free_path_mm(preset: Preset) -> np.ndarray:
     """Mean free path in mm [3] whose profile is the preset's Burley shape."""
-    A = subsurface_color(preset)
-    return preset.burley_d_mm * (1.85 - A + 7 * np.abs(A - 0.8) ** 3)
+    return burley.mean_free_path_mm(preset.burley_d_mm, subsurface_color(preset))
 
 
 def single_scattering_albedo(color: np.ndarray, g: float = 0.0) -> np.ndarray:
@@ -45,7 +44,8 @@ def document(presets: list[Preset], mm_per_unit: float = 10.0) -> str:
             "subsurface_weight": ("float", "1"), "subsurface_color": ("color3", _numbers(subsurface_color(preset))),
             "subsurface_radius": ("float", _numbers([radius.max()])),
             "subsurface_radius_scale": ("color3", _numbers(radius / radius.max())),
-            "subsurface_scatter_anisotropy": ("float", "0"), "specular_ior": ("float", f"{N}"),
+            "subsurface_scatter_anisotropy": ("float", "0"),
+            "specular_ior": ("float", _numbers([preset.refractive_index])),
             "specular_roughness": ("float", "0.45"),
         }  # fmt: skip
         lines.append(f'  <open_pbr_surface name="surface_{name}" type="surfaceshader">')
@@ -66,7 +66,7 @@ def _numbers(values) -> str:
 
 def write(source: Source, folder: Path) -> Report:
     """Write skin.mtlx into a folder."""
-    presets = source.presets
+    presets, n, entry = source.presets, source.refractive_index, source.entry
     (folder / FILE).write_text(document(presets), encoding="utf-8")
     error = {p.name: {"burley_ee_difference": p.burley_difference.tolist(), "negative_share": p.clamped_share.tolist()}
              for p in presets}  # fmt: skip
@@ -74,11 +74,12 @@ def write(source: Source, folder: Path) -> Report:
     return Report((
         f"{FILE}: MaterialX 1.39, an OpenPBR surface and material for each of {len(presets)} presets.",
         "Space: linear Rec. 709. Lengths: 1 scene unit is 1 cm; scale subsurface_radius where yours is another.",
-        "subsurface_color: diffuse color without the entry transmission (0.9722), which the renderer applies itself.",
+        f"subsurface_color: diffuse color without the entry transmission ({entry:.4f}), which the renderer applies "
+        "itself.",
         "subsurface_radius * subsurface_radius_scale: mean free path per channel,",
         "d (1.85 - A + 7 |A - 0.8|^3) of the closest Burley shape d and the albedo A (Christensen & Burley 2015).",
         "No axis and no texture: values per preset; for maps use the cube or exr export.",
-        "specular_ior is the skin's 1.4; specular_roughness 0.45 is a start, not measured.",
+        f"specular_ior is the skin's {n:g}; specular_roughness 0.45 is a start, not measured.",
         "A renderer's random walk gives its own shape: these numbers set its width.",
         f"Error it adds: {worst.burley_difference.max():.2g} of the light at the wrong radius at most ({worst.name}).",
         MADE,

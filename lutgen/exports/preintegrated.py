@@ -12,6 +12,7 @@ import numpy as np
 
 from lutgen.exports.resampled import MADE, Preset, Report, Source, difference
 from lutgen.files import exr
+from lutgen.solvers import profiles
 
 SIZE = (128, 64)
 """Texels along N.L and along curvature."""
@@ -43,8 +44,7 @@ def shaded(energy: np.ndarray, edges: np.ndarray, n_dot_l: np.ndarray, curvature
 
 def through(energy: np.ndarray, edges: np.ndarray, thickness_mm: np.ndarray) -> np.ndarray:
     """Share of the light [..., 3] that comes through a part of a thickness: all that would travel farther than that."""
-    P = np.concatenate([np.zeros((1, 3)), np.cumsum(energy / energy.sum(axis=0), axis=0)])
-    return 1 - np.stack([np.interp(thickness_mm, edges, P[:, c]) for c in range(3)], axis=-1)
+    return 1 - np.stack([np.interp(thickness_mm, edges, P) for P in profiles.encircled(energy.T)], axis=-1)
 
 
 def texels(preset: Preset) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from lutgen import color
 from lutgen.errors import whole
-from lutgen.skin.tissue import PRESETS
+from lutgen.skin.tissue import PRESETS, REFRACTIVE_INDEX
 from lutgen.solvers import burley
 from lutgen.tables import expand
 from lutgen.tables.axes import Grid
@@ -18,8 +18,6 @@ from lutgen.tables.lut_set import LutSet
 SIZES = (2, 256)
 AXES = ("melanin", "eumelanin", "hemoglobin")
 POINTS = 1000
-ENTRY = 1 - ((1.4 - 1) / (1.4 + 1)) ** 2
-"""Share of light along the normal that enters skin of index 1.4; every color contains it."""
 MEANING = (
     "A value is the share of light along the normal that leaves diffusely, entry transmission included, gloss not:",
     "so multiply irradiance by T(theta)/T(0) with your own Fresnel, never by 1 - F a second time.",
@@ -40,7 +38,8 @@ class Report:
 class Preset:
     """A preset that the LUTs cover, in linear Rec. 709 as engines calculate: its skin, its color [3], its profile as
     normalized rings [B, 3] with edges [B + 1] in mm, the share of each channel that was negative and set to 0 [3], and
-    the d in mm of the Burley shape closest to it [3] with the EE difference of that fit [3]."""
+    the d in mm of the Burley shape closest to it [3] with the EE difference of that fit [3], the index of refraction of
+    its surface and the share of light along the normal that enters there, which the color contains."""
 
     name: str
     skin: tuple[float, float, float]
@@ -50,6 +49,8 @@ class Preset:
     clamped_share: np.ndarray
     burley_d_mm: np.ndarray
     burley_difference: np.ndarray
+    refractive_index: float
+    entry: float
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,16 @@ class Source:
 
     def __post_init__(self):
         object.__setattr__(self, "size", whole("size", self.size, *SIZES))
+
+    @property
+    def refractive_index(self) -> float:
+        """Index of refraction of the skin."""
+        return REFRACTIVE_INDEX
+
+    @property
+    def entry(self) -> float:
+        """Share of light along the normal that enters the skin; every color contains it."""
+        return self.luts.paths.entry
 
     @property
     def grid(self) -> Grid:
@@ -111,7 +122,8 @@ class Source:
                 rings, clamped = expand.normalized(profile.energy)
                 edges = profile.radius_edges_mm
                 fit = burley.fit(rings, edges)
-                presets.append(Preset(name, point, self.luts.color(*point), rings, edges, clamped, *fit))
+                surface = self.refractive_index, self.entry
+                presets.append(Preset(name, point, self.luts.color(*point), rings, edges, clamped, *fit, *surface))
         return presets
 
 

@@ -16,7 +16,7 @@ from PIL import Image
 from lutgen.color import encode_srgb
 from lutgen.exports import lookup
 from lutgen.exports.ktx2 import UNSPECIFIED, ktx2
-from lutgen.exports.resampled import ENTRY, MADE, MEANING, Report, Source, difference
+from lutgen.exports.resampled import MADE, MEANING, Report, Source, difference
 from lutgen.files import texture_maps
 from lutgen.head import builtin, paint
 from lutgen.tables import shader_axes
@@ -88,7 +88,10 @@ def page(source: Source, written: dict[str, bytes]) -> str:
     painted = paint.paint(shape)
     arrays, facts = _mesh(shape, painted["surface"][..., 2])
     packed = {COLOR: written[COLOR], PROFILE: written[PROFILE], **arrays}
-    constants = f"const float ENTRY = {ENTRY:.9g};\nconst int QUANTILES = {lookup.QUANTILES};"
+    constants = (
+        f"const float INDEX = {source.refractive_index:.9g}, ENTRY = {source.entry:.9g}, F0 = 1.0 - ENTRY;\n"
+        f"const int QUANTILES = {lookup.QUANTILES};"
+    )
     data = {
         "packed": {name: _text(zlib.compress(content, 9)) for name, content in packed.items()},
         "pictures": {"pigments": _text(_pigments(painted)), "bumps": _text(_jpeg(painted["normal"][::2, ::2, :3]))},

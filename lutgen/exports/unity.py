@@ -46,10 +46,10 @@ def diffusion_profile(preset: Preset) -> dict:
     """A preset as an HDRP Diffusion Profile: color x multiplier is Burley's d in mm."""
     widest = float(preset.burley_d_mm.max())
     return {
-        "name": "Lutgen" + "".join(part.capitalize() for part in preset.name.split("-")),
+        "name": f"Lutgen{engine_textures.capitalized(preset.name)}",
         "color": (preset.burley_d_mm / widest).tolist(),
         "multiplier": widest,
-        "ior": engine_textures.N,
+        "ior": preset.refractive_index,
         "filterRadiusMm": FILTER_RADIUS * widest,
     }
 
@@ -88,6 +88,7 @@ def write(source: Source, folder: Path) -> Report:
         (folder / f"{name}.meta").write_text(meta, encoding="ascii")
     error, worst = engine_textures.errors(source, half, texels)
     error["cube"] = cube.error(source, values)
+    n = source.refractive_index
     return Report((
         "Put the folder into Assets (2021.3 or later), then Tools > Lutgen > Import: textures, a Texture3D of the .cube"
         " and, where HDRP is installed, a Diffusion Profile per preset (values: lutgen.json).",
@@ -99,8 +100,9 @@ def write(source: Source, folder: Path) -> Report:
         f"warp. lutgen.hlsl is for the textures; its Lutgen*_float for Shader Graph's Custom Function (File).",
         f"Axis warp: {'; '.join(axes.values())}; half texel: u = (t * (n - 1) + 0.5) / n; both are in "
         "lutgen.hlsl.",
-        "Diffusion Profile: scattering color * multiplier = D in mm of the closest Burley shape, 1 unit = 1 m, IOR 1.4;"
-        f" filter radius {FILTER_RADIUS} D; 20, 40 or 80 samples by quality; at most {PROFILES} profiles in a scene.",
+        "Diffusion Profile: scattering color * multiplier = D in mm of the closest Burley shape, 1 unit = 1 m, "
+        f"IOR {n:g}; filter radius {FILTER_RADIUS} D; 20, 40 or 80 samples by quality; at most {PROFILES} profiles in "
+        "a scene.",
         *MEANING,
         f"Error it adds: color {error['color']['largest']:.2g} (half floats), .cube "
         f"{error['cube']['color']['largest']:.2g}; of the light at the wrong radius: rings "

@@ -21,6 +21,7 @@ import numpy as np
 from lutgen.exports import engine_textures, lookup
 from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source
 from lutgen.files import exr
+from lutgen.solvers import burley
 from lutgen.tables import shader_axes
 
 COLOR, PROFILE = "T_LutgenColor.exr", "T_LutgenProfile.exr"
@@ -37,7 +38,7 @@ def subsurface_profile(preset: Preset) -> dict:
     The surface albedo is the color itself: the engine's diffuse light does not lose the share that its gloss reflects.
     """
     albedo = np.clip(preset.linear_srgb, LEAST, 1)
-    path_cm = 0.6 * (1.85 - albedo + 7 * np.abs(albedo - 0.8) ** 3) * preset.burley_d_mm / 10 / WORLD_UNIT_SCALE
+    path_cm = 0.6 * burley.mean_free_path_mm(preset.burley_d_mm, albedo) / 10 / WORLD_UNIT_SCALE
     distance = max(float(path_cm.max()), LEAST_DISTANCE_CM)
     return {
         "surface_albedo": albedo.tolist(),
@@ -46,7 +47,7 @@ def subsurface_profile(preset: Preset) -> dict:
         "world_unit_scale": WORLD_UNIT_SCALE,
         "enable_burley": True,
         "enable_mean_free_path": True,
-        "ior": engine_textures.N,
+        "ior": preset.refractive_index,
     }
 
 
@@ -56,7 +57,7 @@ def asset_name(preset: str) -> str:
     >>> asset_name("very-light")
     'SSP_Lutgen_VeryLight'
     """
-    return "SSP_Lutgen_" + "".join(part.capitalize() for part in preset.split("-"))
+    return f"SSP_Lutgen_{engine_textures.capitalized(preset)}"
 
 
 def write(source: Source, folder: Path) -> Report:
@@ -80,6 +81,7 @@ def write(source: Source, folder: Path) -> Report:
     }
     (folder / "lutgen.json").write_text(json.dumps(values, indent=1) + "\n", encoding="ascii")
     error, worst = engine_textures.errors(source, half, texels)
+    n = source.refractive_index
     return Report((
         "import_lutgen.py: run it in the editor (Python Editor Script Plugin, Tools > Execute Python Script; 5.1 or "
         "later): it makes /Game/Lutgen, the textures and a Subsurface Profile per preset (values: lutgen.json).",
@@ -92,7 +94,7 @@ def write(source: Source, folder: Path) -> Report:
         f"Axis warp: {'; '.join(axes.values())}; half texel: u = (t * (n - 1) + 0.5) / n; both in the "
         "HLSL.",
         "Subsurface Profile: color * distance * world unit scale = 0.6 (1.85 - A + 7 |A - 0.8|^3) d in cm, A the color,"
-        " d the closest Burley shape's; mean free path must stay enabled; IOR 1.4 (the engine's own is 1.55).",
+        f" d the closest Burley shape's; mean free path must stay enabled; IOR {n:g} (the engine's own is 1.55).",
         *MEANING,
         f"Error it adds: color {error['color']['largest']:.2g} (half floats); of the light at the wrong radius: rings "
         f"{error['rings']['largest']:.2g}, Subsurface Profiles {worst:.2g} at most (Burley's shape).",

@@ -27,6 +27,18 @@ def encircled(radius_mm: np.ndarray | float, d_mm: np.ndarray | float) -> np.nda
     return -(np.expm1(-x) + 3 * np.expm1(-x / 3)) / 4
 
 
+def mean_free_path_mm(d_mm: np.ndarray, albedo: np.ndarray) -> np.ndarray:
+    """Mean free path in mm of a medium of surface albedo `albedo` whose searchlight profile is Burley's of length d.
+
+    d (1.85 - A + 7 |A - 0.8|^3); Christensen & Burley 2015, equation 5.
+
+    >>> float(mean_free_path_mm(2.0, 0.8))
+    2.1
+    """
+    albedo = np.asarray(albedo, float)
+    return np.asarray(d_mm, float) * (1.85 - albedo + 7 * np.abs(albedo - 0.8) ** 3)
+
+
 def _columns(profile_energy: np.ndarray, radius_edges_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Energies [channels, B] and finite edges [B + 1], or InputError."""
     energy, edges = np.asarray(profile_energy, float), np.asarray(radius_edges_mm, float)

@@ -15,9 +15,10 @@ layout(location = 3) out vec4 gloss;      // reflected radiance
 const float KEY = 0.92, RIM = 0.55, SKY = 0.42;
 const vec3 RIM_WAY = vec3(0.80, 0.25, -0.55);
 
-// Share that enters at a cosine, relative to the normal: dielectric Fresnel at n = 1.4, as the LUT's values contain it.
+// Share that enters at a cosine, relative to the normal: dielectric Fresnel, as the LUT's values contain it.
 float enters(float c) {
-    float t = sqrt(1.0 - (1.0 - c * c) / 1.96), a = (c - 1.4 * t) / (c + 1.4 * t), b = (1.4 * c - t) / (1.4 * c + t);
+    float t = sqrt(1.0 - (1.0 - c * c) / (INDEX * INDEX));  // cosine inside
+    float a = (c - INDEX * t) / (c + INDEX * t), b = (INDEX * c - t) / (INDEX * c + t);
     return (1.0 - 0.5 * (a * a + b * b)) / ENTRY;
 }
 
@@ -36,7 +37,7 @@ float glint(vec3 n, vec3 v, vec3 l, float roughness) {
     vec3 h = normalize(v + l);
     float nl = dot(n, l), nv = max(dot(n, v), 0.02), nh = dot(n, h), a2 = roughness * roughness * roughness * roughness;
     if (nl <= 0.0) return 0.0;
-    float d = nh * nh * (a2 - 1.0) + 1.0, F = 0.0278 + 0.9722 * pow(1.0 - max(dot(v, h), 0.0), 5.0);
+    float d = nh * nh * (a2 - 1.0) + 1.0, F = F0 + ENTRY * pow(1.0 - max(dot(v, h), 0.0), 5.0);
     float shade = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
     return a2 / (d * d) * F * 0.5 / shade * nl;
 }
@@ -58,6 +59,6 @@ void main() {
     place = vec4(skin.x * ratio.x, skin.y, skin.z * ratio.y, 1.0);
     vec3 back = reflect(-v, m);
     float around = SKY * open_sky * mix(0.25, 1.0, smoothstep(-0.4, 0.8, dot(back, up)));
-    float rim = 0.0278 + (1.0 - roughness) * 0.55 * pow(1.0 - max(dot(m, v), 0.0), 5.0);
+    float rim = F0 + (1.0 - roughness) * 0.55 * pow(1.0 - max(dot(m, v), 0.0), 5.0);
     gloss = vec4(vec3(KEY * lit * glint(m, v, l, roughness) + RIM * open_sky * glint(m, v, r, roughness) + around * rim), 1.0);
 }
