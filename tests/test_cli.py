@@ -74,8 +74,8 @@ def test_recipe_file_and_options_override_each_other_in_order(capsys, tmp_path):
     recipe.write_text('photons = 4096\nwavelengths = "6"\nseed = 3\n')
     status, text, _ = run(capsys, "bake", recipe, "--seed", 4, "--out", tmp_path / "x", "--json")
     assert status == 0
-    made = json.loads(text)["recipe"]
-    assert (made["photons"], made["wavelengths"], made["seed"]) == (4096, "6", 4)
+    followed = json.loads(text)["recipe"]
+    assert (followed["photons"], followed["wavelengths"], followed["seed"]) == (4096, "6", 4)
 
 
 def test_swatch_prints_color_and_json(capsys, tmp_path):
@@ -129,8 +129,8 @@ def test_an_interrupt_is_one_line_status_130(capsys, monkeypatch):
 def test_swatch_by_monte_carlo_agrees_with_its_sigma(capsys, method):
     status, text, _ = run(capsys, "swatch", "--preset", "tan", "--method", method, "--photons", 8192, "--json")
     assert status == 0
-    found, exact = json.loads(text), lutgen.spectrum(lutgen.preset("tan"))
-    z = (np.array(found["reflectance"]) - exact) / np.array(found["std_error"])
+    estimate, exact = json.loads(text), lutgen.spectrum(lutgen.preset("tan"))
+    z = (np.array(estimate["reflectance"]) - exact) / np.array(estimate["std_error"])
     assert np.abs(z).max() < 4.5
     assert 0.6 < z.std() < 1.4
 
@@ -138,8 +138,8 @@ def test_swatch_by_monte_carlo_agrees_with_its_sigma(capsys, method):
 def test_devices_lists_what_is_there(capsys):
     status, text, _ = run(capsys, "devices", "--json")
     assert status == 0
-    found = json.loads(text)["devices"]
-    assert found[0]["lanes"] in (1, 4, 8, 16)
+    devices = json.loads(text)["devices"]
+    assert devices[0]["lanes"] in (1, 4, 8, 16)
 
 
 def test_bench_reports_the_trace_and_the_bakes(capsys, monkeypatch):

@@ -55,7 +55,7 @@ def run(capsys, *arguments):
     return status, out, err
 
 
-def made(capsys, *arguments) -> dict:
+def report_of(capsys, *arguments) -> dict:
     status, out, err = run(capsys, *arguments, "--json")
     assert (status, err) == (0, "")
     return json.loads(out)
@@ -64,9 +64,9 @@ def made(capsys, *arguments) -> dict:
 def value(folder, name: str) -> np.ndarray:
     """What a map's texels stand for, first row on top."""
     (path,) = folder.glob(f"{name}.*")
-    found = images.read(path, "map")
-    texels = found.values[..., 0]
-    if found.bits == 32:
+    picture = images.read(path, "map")
+    texels = picture.values[..., 0]
+    if picture.bits == 32:
         return texels
     return {"residual": 32 * texels, "out_of_reach": texels}.get(name, 4 * texels.astype(float) ** 3)
 
@@ -89,22 +89,23 @@ def test_what_is_written_is_what_the_albedo_needs(capsys, tmp_path, luts, painte
     noise = 0.05 if kind == "exr" else 0.01  # PNG holds ratios up to 4
     albedo = albedo * (1 + noise * np.random.default_rng(3).standard_normal(albedo.shape))
     out = tmp_path / "out"
-    said = made(capsys, save(tmp_path / f"a.{kind}", albedo), "--out", out, "--format", kind, "--balance", "none",
-                "--eumelanin", 0.7)  # fmt: skip
-    assert said["gain"] == [1, 1, 1]
-    skin = said["skin"]
-    found = [skin[name] * value(out, name) for name in texture_maps.RATIOS]
-    assert np.median(found[0] / m) == pytest.approx(1, abs=0.02)
-    assert np.median(found[2] / h) == pytest.approx(1, abs=0.02)
-    left = color.delta_e00(lab(shown(luts, *found)), lab(albedo))
-    held = (found[0] < 3.99 * skin["melanin"]) & (found[2] < 3.99 * skin["hemoglobin"]) | (kind == "exr")
-    assert np.mean(held) == pytest.approx(1 - said["residual"]["beyond_png_ratio_share"] * (kind == "png"), abs=1e-3)
+    source = save(tmp_path / f"a.{kind}", albedo)
+    report = report_of(capsys, source, "--out", out, "--format", kind, "--balance", "none",
+                       "--eumelanin", 0.7)  # fmt: skip
+    assert report["gain"] == [1, 1, 1]
+    skin = report["skin"]
+    chromophores = [skin[name] * value(out, name) for name in texture_maps.RATIOS]
+    assert np.median(chromophores[0] / m) == pytest.approx(1, abs=0.02)
+    assert np.median(chromophores[2] / h) == pytest.approx(1, abs=0.02)
+    left = color.delta_e00(lab(shown(luts, *chromophores)), lab(albedo))
+    held = (chromophores[0] < 3.99 * skin["melanin"]) & (chromophores[2] < 3.99 * skin["hemoglobin"]) | (kind == "exr")
+    assert np.mean(held) == pytest.approx(1 - report["residual"]["beyond_png_ratio_share"] * (kind == "png"), abs=1e-3)
     assert value(out, "residual")[held] == pytest.approx(left[held], abs=0.02)
-    assert said["residual"]["delta_e00_median"] == pytest.approx(np.median(left), abs=0.01)
-    assert said["residual"]["delta_e00_p95"] == pytest.approx(np.quantile(left, 0.95), abs=0.01)
-    assert said["residual"]["texels"] == left.size
+    assert report["residual"]["delta_e00_median"] == pytest.approx(np.median(left), abs=0.01)
+    assert report["residual"]["delta_e00_p95"] == pytest.approx(np.quantile(left, 0.95), abs=0.01)
+    assert report["residual"]["texels"] == left.size
     missed = value(out, "out_of_reach")
-    assert np.mean(missed == 1) == pytest.approx(np.mean(left > said["out_of_reach_delta_e00"]), abs=1e-3)
+    assert np.mean(missed == 1) == pytest.approx(np.mean(left > report["out_of_reach_delta_e00"]), abs=1e-3)
     facts = json.loads((out / "maps.json").read_text())
     assert facts["skin"] == skin
     assert set(facts["files"]) | {"maps.json"} == {path.name for path in out.iterdir()}
@@ -114,14 +115,14 @@ def test_what_is_written_is_what_the_albedo_needs(capsys, tmp_path, luts, painte
 def test_the_viewer_reads_the_maps_as_they_are(capsys, tmp_path, luts, painted, kind):
     """Sliders at the stated skin times the ratios give the albedo's colors, and nothing fades."""
     m, _, albedo = painted
-    said = made(capsys, save(tmp_path / "a.exr", albedo), "--out", tmp_path / "out", "--format", kind)
-    assert said["skin"]["eumelanin"] == 0.7
+    report = report_of(capsys, save(tmp_path / "a.exr", albedo), "--out", tmp_path / "out", "--format", kind)
+    assert report["skin"]["eumelanin"] == 0.7
     under = texture_maps.Maps(albedo=np.ones((2, 2, 3)))
-    found = texture_maps.load(tmp_path / "out", under)
-    assert found.albedo is None  # it is what the maps were made of
-    assert found.full_contrast_melanin == said["skin"]["melanin"] == pytest.approx(np.median(m), rel=0.01)
-    assert found.chromophores is not None
-    skin = found.chromophores * [said["skin"][name] for name in texture_maps.RATIOS]
+    maps = texture_maps.load(tmp_path / "out", under)
+    assert maps.albedo is None  # it is what the maps were made of
+    assert maps.full_contrast_melanin == report["skin"]["melanin"] == pytest.approx(np.median(m), rel=0.01)
+    assert maps.chromophores is not None
+    skin = maps.chromophores * [report["skin"][name] for name in texture_maps.RATIOS]
     apart = color.delta_e00(lab(shown(luts, *np.moveaxis(skin, -1, 0))), lab(albedo[::-1]))
     assert apart.max() < 0.3
 
@@ -129,8 +130,8 @@ def test_the_viewer_reads_the_maps_as_they_are(capsys, tmp_path, luts, painted, 
 def test_absolute_maps_lie_on_the_axes_of_the_lut(capsys, tmp_path, luts, painted):
     m, h, albedo = painted
     albedo = save(tmp_path / "a.exr", albedo)
-    made(capsys, albedo, "--out", tmp_path / "png", "--absolute")
-    made(capsys, albedo, "--out", tmp_path / "exr", "--absolute", "--format", "exr")
+    report_of(capsys, albedo, "--out", tmp_path / "png", "--absolute")
+    report_of(capsys, albedo, "--out", tmp_path / "exr", "--absolute", "--format", "exr")
     for axis, values in ((luts.color_lut.grid.melanin, m), (luts.color_lut.grid.hemoglobin, h)):
         texels = images.read(tmp_path / "png" / f"{axis.name}_absolute.png", "map").values[..., 0]
         as_is = images.read(tmp_path / "exr" / f"{axis.name}_absolute.exr", "map").values[..., 0]
@@ -140,25 +141,25 @@ def test_absolute_maps_lie_on_the_axes_of_the_lut(capsys, tmp_path, luts, painte
 
 
 def test_light_is_found_given_and_given_back(capsys, tmp_path, painted):
-    """What is printed, given by hand, gives the same; a tint is not found where it is said that there is none."""
+    """What is printed, given by hand, gives the same; a tint is not fitted where there is said to be none."""
     albedo = save(tmp_path / "a.exr", painted[2] * [0.8, 1.0, 1.35] * 1.3)
     out = tmp_path / "out"
-    found = made(capsys, albedo, "--out", out, "--eumelanin", 0.7)
-    assert found["residual"]["delta_e00_median"] < 1
-    assert 1.1 < found["balance"][0] / found["balance"][2] < 1.35 / 0.8  # redder light is like more blood
-    assert np.prod(found["balance"]) == pytest.approx(1)
-    again = made(capsys, albedo, "--out", out, "--force", "--eumelanin", 0.7, "--exposure",
-                 found["exposure_stops"], "--balance", ",".join(map(str, found["balance"])))  # fmt: skip
-    assert again["gain"] == pytest.approx(found["gain"])
-    assert again["residual"]["delta_e00_mean"] == pytest.approx(found["residual"]["delta_e00_mean"], abs=1e-3)
-    plain = made(capsys, albedo, "--out", out, "--force", "--balance", "none")
+    fitted = report_of(capsys, albedo, "--out", out, "--eumelanin", 0.7)
+    assert fitted["residual"]["delta_e00_median"] < 1
+    assert 1.1 < fitted["balance"][0] / fitted["balance"][2] < 1.35 / 0.8  # redder light is like more blood
+    assert np.prod(fitted["balance"]) == pytest.approx(1)
+    again = report_of(capsys, albedo, "--out", out, "--force", "--eumelanin", 0.7, "--exposure",
+                      fitted["exposure_stops"], "--balance", ",".join(map(str, fitted["balance"])))  # fmt: skip
+    assert again["gain"] == pytest.approx(fitted["gain"])
+    assert again["residual"]["delta_e00_mean"] == pytest.approx(fitted["residual"]["delta_e00_mean"], abs=1e-3)
+    plain = report_of(capsys, albedo, "--out", out, "--force", "--balance", "none")
     assert plain["gain"] == [1, 1, 1]
-    assert plain["residual"]["delta_e00_median"] > found["residual"]["delta_e00_median"] + 2
-    brighter = made(capsys, albedo, "--out", out, "--force", "--balance", "none", "--exposure", "-1")
+    assert plain["residual"]["delta_e00_median"] > fitted["residual"]["delta_e00_median"] + 2
+    brighter = report_of(capsys, albedo, "--out", out, "--force", "--balance", "none", "--exposure", "-1")
     assert brighter["gain"] == [0.5, 0.5, 0.5]
-    scaled = made(capsys, albedo, "--out", out, "--force", "--balance", "none", "--exposure", "auto")["gain"]
+    scaled = report_of(capsys, albedo, "--out", out, "--force", "--balance", "none", "--exposure", "auto")["gain"]
     assert np.ptp(scaled) == pytest.approx(0)
-    tinted = made(capsys, albedo, "--out", out, "--force", "--exposure", "0")
+    tinted = report_of(capsys, albedo, "--out", out, "--force", "--exposure", "0")
     assert tinted["exposure_stops"] == pytest.approx(0, abs=1e-6)
 
 
@@ -172,11 +173,11 @@ def test_another_skin_has_its_own_tone_and_the_albedos_detail(capsys, tmp_path, 
     alpha[:10], albedo[:10] = 0, 0.25
     alpha[10] = 0.5
     skin, out = PRESETS[preset], tmp_path / "out"
-    made(capsys, save(tmp_path / "a.exr", albedo, alpha), "--out", out, "--format", kind, "--target", preset,
+    report_of(capsys, save(tmp_path / "a.exr", albedo, alpha), "--out", out, "--format", kind, "--target", preset,
          "--eumelanin", 0.7, "--balance", "none")  # fmt: skip
-    found = images.read(out / f"recolored.{kind}", "map")
-    assert found.alpha == pytest.approx(alpha, abs=1e-4)
-    linear = found.values if kind == "exr" else color.decode_srgb(found.values)
+    recolored = images.read(out / f"recolored.{kind}", "map")
+    assert recolored.alpha == pytest.approx(alpha, abs=1e-4)
+    linear = recolored.values if kind == "exr" else color.decode_srgb(recolored.values)
     assert np.all(np.isfinite(linear))
     assert linear[:10] == pytest.approx(albedo[:10], rel=1e-3)
     goal = luts.color(skin.melanin, skin.eumelanin, skin.hemoglobin)
@@ -193,12 +194,12 @@ def test_an_albedo_on_its_own_skin_stays_as_it_is(capsys, tmp_path, painted):
     albedo = save(
         tmp_path / "a.exr", painted[2] * (1 + 0.1 * np.random.default_rng(1).standard_normal((SIDE, SIDE, 3)))
     )
-    given = images.read(albedo, "map").values
-    first = made(capsys, albedo, "--out", tmp_path / "out", "--format", "exr")
+    painted_rgb = images.read(albedo, "map").values
+    first = report_of(capsys, albedo, "--out", tmp_path / "out", "--format", "exr")
     skin = ",".join(str(v) for v in first["skin"].values())
-    made(capsys, albedo, "--out", tmp_path / "out", "--format", "exr", "--force", "--target", skin)
-    found = images.read(tmp_path / "out" / "recolored.exr", "map").values
-    assert color.delta_e00(lab(found), lab(given * first["gain"])).max() < 0.3
+    report_of(capsys, albedo, "--out", tmp_path / "out", "--format", "exr", "--force", "--target", skin)
+    recolored = images.read(tmp_path / "out" / "recolored.exr", "map").values
+    assert color.delta_e00(lab(recolored), lab(painted_rgb * first["gain"])).max() < 0.3
 
 
 def cells_shown(picture: np.ndarray) -> float:
@@ -209,9 +210,9 @@ def cells_shown(picture: np.ndarray) -> float:
         steps = np.abs(np.diff(picture, n=2, axis=axis)).mean(axis=1 - axis)
         power = np.abs(np.fft.rfft(steps - steps.mean()))
         for cells in (32, 64, 96):
-            at = round(cells * len(steps) / picture.shape[axis])
-            near = np.r_[power[at - 15 : at - 2], power[at + 3 : at + 16]]
-            most = max(most, power[at - 1 : at + 2].max() / np.sqrt(np.mean(near**2)))
+            seam = round(cells * len(steps) / picture.shape[axis])
+            near = np.r_[power[seam - 15 : seam - 2], power[seam + 3 : seam + 16]]
+            most = max(most, power[seam - 1 : seam + 2].max() / np.sqrt(np.mean(near**2)))
     return most
 
 
@@ -226,7 +227,7 @@ def test_dark_skin_shows_neither_cells_nor_blotches(capsys, tmp_path, luts, pres
     light = luts.color(0.015 * m, 0.7, 0.009 * h**0.3) * (1 + 0.02 * grain)
     light = np.rint(255 * color.encode_srgb(light)).astype("u1")
     Image.fromarray(light).save(tmp_path / "a.png")
-    made(capsys, tmp_path / "a.png", "--out", tmp_path / "out", "--format", "exr", "--target", preset)
+    report_of(capsys, tmp_path / "a.png", "--out", tmp_path / "out", "--format", "exr", "--target", preset)
     dark = images.read(tmp_path / "out" / "recolored.exr", "map").values
     before, after = (np.log((v @ TO_XYZ)[..., 1]) for v in (color.decode_srgb(light / 255), dark))
     assert np.std(after) < 1.1 * np.std(before)
@@ -235,7 +236,7 @@ def test_dark_skin_shows_neither_cells_nor_blotches(capsys, tmp_path, luts, pres
     for channel in np.moveaxis(np.log(np.maximum(dark, 1e-5)), -1, 0):
         assert cells_shown(channel) < 3.2
     albedo = save(tmp_path / "b.exr", luts.color(skin.melanin * m, 0.7, 0.012 * h) * (1 + 0.002 * grain))
-    made(capsys, albedo, "--out", tmp_path / "maps", "--format", "exr", "--eumelanin", 0.7, "--balance", "none")
+    report_of(capsys, albedo, "--out", tmp_path / "maps", "--format", "exr", "--eumelanin", 0.7, "--balance", "none")
     for name in ("melanin", "hemoglobin"):
         assert cells_shown(np.log(value(tmp_path / "maps", name))) < 3.2
 
@@ -249,11 +250,11 @@ def test_the_wrong_encoding_is_noticed_and_the_right_one_is_not_doubted(capsys, 
     wrong = [save(tmp_path / "b.exr", color.encode_srgb(linear)), save(tmp_path / "b.png", color.decode_srgb(linear))]
     more = ("--out", tmp_path / "out", "--force", "--eumelanin", 0.7, "--balance", "none")
     for path in right:
-        assert made(capsys, path, *more)["warnings"] == []
+        assert report_of(capsys, path, *more)["warnings"] == []
     for path, advice in zip(wrong, ("srgb", "linear"), strict=True):
-        (warning,) = made(capsys, path, *more)["warnings"]
+        (warning,) = report_of(capsys, path, *more)["warnings"]
         assert f"--encoding {advice}" in warning
-        assert made(capsys, path, *more, "--encoding", advice)["warnings"] == []
+        assert report_of(capsys, path, *more, "--encoding", advice)["warnings"] == []
     status, text, _ = run(capsys, wrong[0], *more)
     assert status == 0
     assert "\nwarning: read as linear" in text
@@ -263,11 +264,11 @@ def test_every_color_of_no_skin_is_marked(capsys, tmp_path, painted):
     albedo = painted[2].copy()
     albedo[:16, :16] = [0.1, 0.2, 0.8]
     albedo[:16, 16:32] = [0.001, 0.002, 0.001]
-    said = made(capsys, save(tmp_path / "a.png", albedo), "--out", tmp_path / "out", "--balance", "none")
+    report = report_of(capsys, save(tmp_path / "a.png", albedo), "--out", tmp_path / "out", "--balance", "none")
     missed = value(tmp_path / "out", "out_of_reach")
     assert np.all(missed[:16, :16] == 1)
     assert np.all(missed[:16, 16:32] > 0)
-    assert said["residual"]["out_of_reach_share"] == pytest.approx(np.mean(missed == maps_folder.BEYOND))
+    assert report["residual"]["out_of_reach_share"] == pytest.approx(np.mean(missed == maps_folder.BEYOND))
     assert np.mean(missed[16:] > 0) < 0.01
 
 
@@ -278,7 +279,7 @@ def test_an_albedo_in_acescg_is_read_as_it_says(capsys, tmp_path, luts, painted)
     for name, texels, primaries in (("s", linear, exr.REC709), ("a", acescg, exr.ACESCG)):
         path = tmp_path / f"{name}.exr"
         exr.write(path, [exr.Part("a", exr.rgb(texels), {})], primaries)
-        skins.append(list(made(capsys, path, "--out", tmp_path / name)["skin"].values()))
+        skins.append(list(report_of(capsys, path, "--out", tmp_path / name)["skin"].values()))
     assert skins[0] == pytest.approx(skins[1], rel=0.01)
     p3 = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)
     exr.write(tmp_path / "p3.exr", [exr.Part("a", exr.rgb(linear), {})], p3)
@@ -297,10 +298,11 @@ def test_colors_of_no_skin_are_refused_and_many_of_them_are_said(capsys, tmp_pat
     assert not (tmp_path / "b").exists()
     some = painted[2].copy()
     some[: len(some) // 3] = blue[: len(some) // 3]
-    said = made(capsys, save(tmp_path / "c.png", some), "--out", tmp_path / "c", "--balance", "none")
-    assert any("farther than 5 from any skin" in line for line in said["warnings"])
+    report = report_of(capsys, save(tmp_path / "c.png", some), "--out", tmp_path / "c", "--balance", "none")
+    assert any("farther than 5 from any skin" in line for line in report["warnings"])
     assert not any(
-        "farther" in w for w in made(capsys, save(tmp_path / "d.png", painted[2]), "--out", tmp_path / "d")["warnings"]
+        "farther" in w
+        for w in report_of(capsys, save(tmp_path / "d.png", painted[2]), "--out", tmp_path / "d")["warnings"]
     )
 
 
@@ -316,9 +318,9 @@ def test_any_size_and_an_expanded_set(capsys, tmp_path, luts, shape):
     folder = lutgen.save(luts.expand(oxygenation=0.95), tmp_path / "luts")
     out = tmp_path / "out"
     albedo = save(tmp_path / "a.png", np.broadcast_to(luts.color(0.02, 0.7, 0.01), (*shape, 3)))
-    said = made(capsys, albedo, "--out", out, "--luts", folder, "--target", "0.1,0.7,0.01")
-    assert said["oxygenation"] == 0.95
-    assert said["size"] == [shape[1], shape[0]]
+    report = report_of(capsys, albedo, "--out", out, "--luts", folder, "--target", "0.1,0.7,0.01")
+    assert report["oxygenation"] == 0.95
+    assert report["size"] == [shape[1], shape[0]]
     assert value(out, "melanin").shape == shape
     with Image.open(out / "preview.png") as picture:
         assert picture.size[0] == 1200
@@ -388,7 +390,7 @@ def test_what_is_no_option_is_one_line(capsys, tmp_path, options, message):
 def test_only_maps_are_replaced_and_never_the_albedo(capsys, tmp_path):
     albedo = save(tmp_path / "a.png", GOOD)
     out = tmp_path / "out"
-    made(capsys, albedo, "--out", out)
+    report_of(capsys, albedo, "--out", out)
     status, _, err = run(capsys, albedo, "--out", out)
     assert status == 2
     assert "exists; give another folder, or --force" in err

@@ -41,12 +41,12 @@ def run(capsys, *arguments: str) -> dict:
 
 def test_a_picture_holds_what_it_is_and_how_sure(tmp_path, head, capsys):
     out, png = str(tmp_path / "a.exr"), str(tmp_path / "a.png")
-    said = run(capsys, "--mesh", head, "--spp", "20", "--out", out, "--png", png, "--preset", "dark")
-    assert said["samples"] == 20
-    assert said["rays"] == sum(said["counts"][name] for name in ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS"))
-    assert said["rays_per_s"] > 0
-    assert said["events_per_s"] > 0
-    assert {"tree", "exits", "sample", "write"} <= set(said["seconds"])
+    report = run(capsys, "--mesh", head, "--spp", "20", "--out", out, "--png", png, "--preset", "dark")
+    assert report["samples"] == 20
+    assert report["rays"] == sum(report["counts"][name] for name in ("CAMERA_RAYS", "PROBES", "SUN_RAYS", "SKY_RAYS"))
+    assert report["rays_per_s"] > 0
+    assert report["events_per_s"] > 0
+    assert {"tree", "exits", "sample", "write"} <= set(report["seconds"])
     (part,) = exr.read(Path(out)).values()
     assert {*"RGB", "mask", "samples", "sigma.R", "sigma.G", "sigma.B"} <= set(part.channels)
     assert all(np.all(np.isfinite(values)) for values in part.channels.values())
@@ -101,10 +101,10 @@ def test_a_killed_render_goes_on_and_an_interrupted_one_saves(tmp_path, head):
     command = [sys.executable, "-c", code, "render", *SMALL, "--mesh", head, "--time", "300s", "--out", str(out)]
 
     def started() -> subprocess.Popen:
-        found = out.stat().st_mtime_ns if out.exists() else 0
+        before = out.stat().st_mtime_ns if out.exists() else 0
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         until = time.monotonic() + 60
-        while not (out.exists() and out.stat().st_mtime_ns > found) and time.monotonic() < until:
+        while not (out.exists() and out.stat().st_mtime_ns > before) and time.monotonic() < until:
             assert process.poll() is None, process.communicate()
             time.sleep(0.05)
         return process
@@ -116,9 +116,9 @@ def test_a_killed_render_goes_on_and_an_interrupted_one_saves(tmp_path, head):
     assert first > 0
     process = started()
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=60)
+    report, _ = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "interrupted; the same command goes on" in said
+    assert "interrupted; the same command goes on" in report
     assert next(iter(exr.read(out).values())).attributes["render"]["samples"] > first
 
 
@@ -148,7 +148,7 @@ def test_bad_input_is_one_line(arguments, message, tmp_path, head, capsys, monke
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.exr").mkdir()
     (tmp_path / "folder.png").mkdir()
-    assert main(["render", *SMALL, "--spp", "5", "--out", "a.exr", "--mesh", head, *arguments]) == 2
+    assert main(["render", *SMALL, "--quiet", "--spp", "5", "--out", "a.exr", "--mesh", head, *arguments]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
@@ -197,10 +197,10 @@ def test_what_is_odd_about_a_head_is_said(tmp_path, capsys):
     command = ["render", "--size", "16x16", "--mesh", str(tmp_path / "ball.glb"), "--spp", "5", "--out", out]
     command += ["--set", "distance_mm=4000"]
     assert main([*command, "--mm-per-unit", "1"]) == 0
-    said = capsys.readouterr().out
-    assert "triangles ran clockwise" in said
-    assert "the head is 2200 mm high" in said
-    assert "has no texture coordinates" in said
+    report = capsys.readouterr().out
+    assert "triangles ran clockwise" in report
+    assert "the head is 2200 mm high" in report
+    assert "has no texture coordinates" in report
     assert (
         main([*command, "--mm-per-unit", "0.1", "--set", "target_mm=900,0,0", "--set", "field_of_view=5", "--force"])
         == 0
