@@ -99,9 +99,10 @@ def run(options: Namespace) -> Outcome:
     before = None if options.force or not out.exists() else _same(film.read(out), recipe, out)
     seconds = {"head": time.perf_counter() - start}
     with progress.Progress(options) as tell, _interruptible() as stopped:
-        with _timed(seconds, "tree", tell):
+        with _timed(seconds, "tree"):
             stage = device_scene.open_stage(device, luts, head, scene.maps, look, size, scene.surroundings, seed)
-        with _timed(seconds, "exits", tell):
+        tell("exits", None)
+        with _timed(seconds, "exits"):
             walk = flat_walk.WALKS[options.walk](stage, seed)
         notes = (*notes, *walk.facts.get("notes", ()))
         facts = {"recipe": recipe, "walk": walk.facts, "notes": list(notes), "device": device.name}
@@ -166,9 +167,8 @@ def _text(result: dict, seen: bool) -> str:
 
 
 @contextlib.contextmanager
-def _timed(seconds: dict[str, float], stage: str, tell: Callable) -> Iterator[None]:
-    """Tell of a stage, and put down its seconds."""
-    tell(stage, None)
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Put down a stage's seconds."""
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start
