@@ -169,6 +169,7 @@ def lanes_apart() -> float:
     stack, edges = [Layer(0.1, 3.0, 25, 0.78), Layer(np.inf, 0.3, 25, 0.78)], np.array([0.0, 0.05, 0.5, 20.0])
 
     def rings(photons: int, seed: int, device: ocl.Device) -> tuple[np.ndarray, np.ndarray]:
+        """Share of the photons in each ring, and its variance."""
         total, square, _ = path_table.ring_sums(stack, edges, photons, seed, device)
         return total / photons, (square / photons - (total / photons) ** 2) / photons
 
