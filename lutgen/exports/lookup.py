@@ -17,7 +17,6 @@ from lutgen.solvers import profiles
 from lutgen.tables import expand, shader_axes
 
 QUANTILES = 64
-DIALECTS = ("glsl", "gdshader", "hlsl")
 
 _COLOR = """
 // Diffuse color in linear Rec. 709 of a skin; `lut` is a 3-D texture: x melanin, y eumelanin, z hemoglobin.

@@ -17,6 +17,7 @@ import numpy as np
 from lutgen.files import exr, images, texture_maps
 from lutgen.fitting import albedo_to_skin
 from lutgen.fitting.albedo_to_skin import Inversion
+from lutgen.tables import shader_axes
 from lutgen.tables.axes import Axis
 from lutgen.tables.lut_set import LutSet
 
@@ -68,11 +69,7 @@ def layers(luts: LutSet, found: Inversion, absolute: bool = False) -> dict[str, 
 def _axis_formula(axis: Axis) -> str:
     if axis.count == 1:
         return f"{axis.name} is {axis.low:g} throughout"
-    p = axis.exponent
-    value = (
-        f"{axis.low:.9g} ({axis.high:.9g} / {axis.low:.9g})^t" if p == 0
-        else f"({axis.low:.9g}^p + t ({axis.high:.9g}^p - {axis.low:.9g}^p))^(1/p) with p = {p:.9g}"
-    )  # fmt: skip
+    value = shader_axes.unwarp(axis, "t", "text")
     return f"{axis.name}: {value}; the LUT's texture coordinate is (t {axis.count - 1} + 0.5) / {axis.count}"
 
 
