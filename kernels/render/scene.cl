@@ -1,27 +1,8 @@
 // The scene on the device: what lies at a hit, read from the head's vertices and maps as the viewer's shaders read them.
 // Lengths in mm, colors in linear ACEScg. `view_t` is made from the host's dtype (lutgen/render/device_scene.py).
-#define SCENE TREE, __global const view_t *view, __global const float8 *vertices, __global const int *corners, \
-    __global const half *chromophore_map, __global const half *surface_map, __global const half *normal_map, \
-    __global const half *detail_map, __global const float4 *pore_map, __global const float4 *environment_map, \
-    __global const float *sky, __global const float2 *lobe_table, __global const float *waves
-#define SCENE_HERE {boxes, children, shapes, numbers, view, vertices, corners, chromophore_map, surface_map, normal_map, \
-    detail_map, pore_map, environment_map, sky, lobe_table, waves}
+// A kernel over a scene takes SCENE; SCENE_HERE is what it took, as a scene_t. Both and the type are made from the host's
+// table of buffers (SCENE there).
 #define TREE_OF(s) (s)->boxes, (s)->children, (s)->shapes, (s)->numbers
-
-typedef struct {
-    __global const float *boxes;
-    __global const int *children;
-    __global const float *shapes;
-    __global const int *numbers;
-    __global const view_t *view;
-    __global const float8 *vertices;  // position, normal, texture coordinates
-    __global const int *corners;      // three per triangle
-    __global const half *chromophore_map, *surface_map, *normal_map, *detail_map;
-    __global const float4 *pore_map, *environment_map;
-    __global const float *sky;          // how bright the environment is, over an octahedron
-    __global const float2 *lobe_table;  // energy of a GGX lobe over (roughness, root of the cosine)
-    __global const float *waves;        // WAVE floats per wavelength
-} scene_t;
 
 // Columns of `waves`: absorption of eumelanin, pheomelanin, baseline and blood, what absorbs besides in epidermis and
 // dermis, the life rate nu (all 1/mm), and the ACEScg weight.

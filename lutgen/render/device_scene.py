@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +27,18 @@ PLAIN = {"chromophore": (1.0, 1.0, 1.0, 1.0), "surface": (1.0, 1.0, 1.0, 1.0), "
 """What stands for a map that is not given, as in the viewer; a map's missing channels are 1."""
 WAVE, NU = 10, 6
 """Columns of `waves`, and which of them is the life rate."""
-CHROMOPHORE_MAP = 7
-"""Its place in a stage's arguments."""
+SCENE = (
+    ("boxes", "float"), ("children", "int"), ("shapes", "float"), ("numbers", "int"),  # the tree: trace.cl
+    ("view", "view_t"),
+    ("vertices", "float8"),  # position, normal, texture coordinates
+    ("corners", "int"),  # three per triangle
+    ("chromophore_map", "half"), ("surface_map", "half"), ("normal_map", "half"), ("detail_map", "half"),
+    ("pore_map", "float4"), ("environment_map", "float4"),
+    ("sky", "float"),  # how bright the environment is, over an octahedron
+    ("lobe_table", "float2"),  # energy of a GGX lobe over (roughness, root of the cosine)
+    ("waves", "float"),  # WAVE floats per wavelength
+)  # fmt: skip
+"""The buffers of a scene, name and element type: parameters, arguments and `scene_t` of its kernels."""
 BASE = (
     "common/lanes", "common/rng", "render/trace", "common/frame", "render/scene", "render/light",
     "render/surface_light", "render/moments",
@@ -64,14 +75,19 @@ VIEW = np.dtype(
 
 @dataclass(frozen=True)
 class Stage:
-    """Buffers of one head, skin and light on a device; `arguments` are a kernel's SCENE, in its order."""
+    """One head, skin and light on a device; `buffers` by the names of SCENE."""
 
     device: ocl.Device
     luts: LutSet
     shape: Mesh
     view: np.ndarray
-    arguments: tuple
+    buffers: dict[str, Any]
     width: int
+
+    @property
+    def arguments(self) -> tuple:
+        """What a kernel's SCENE takes."""
+        return tuple(self.buffers[name] for name, _ in SCENE)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -99,13 +115,14 @@ def open_stage(
     radiance = _surroundings(around)
     view = _view(luts, look, size, textures, radiance, seed, bounces)
     uv = np.zeros((len(shape.positions_mm), 2)) if shape.uv is None else shape.uv
-    arrays = (
-        tree.boxes, tree.children, tree.triangles, tree.numbers, view,
-        np.concatenate([shape.positions_mm, shape.normals, uv], axis=1).astype("f4"), shape.triangles.astype("i4"),
-        *(textures[name] for name in PLAIN), pores.texture(), radiance, _sky(radiance[..., :3], look),
-        lighting.ggx_albedo().astype("f4"), waves(luts, look.oxygenation),
-    )  # fmt: skip
-    return Stage(device, luts, shape, view, tuple(ocl.buffer(device, values) for values in arrays), width)
+    arrays = {
+        "boxes": tree.boxes, "children": tree.children, "shapes": tree.triangles, "numbers": tree.numbers, "view": view,
+        "vertices": np.concatenate([shape.positions_mm, shape.normals, uv], axis=1).astype("f4"),
+        "corners": shape.triangles.astype("i4"), **{f"{name}_map": textures[name] for name in PLAIN},
+        "pore_map": pores.texture(), "environment_map": radiance, "sky": _sky(radiance[..., :3], look),
+        "lobe_table": lighting.ggx_albedo().astype("f4"), "waves": waves(luts, look.oxygenation),
+    }  # fmt: skip
+    return Stage(device, luts, shape, view, {name: ocl.buffer(device, arrays[name]) for name, _ in SCENE}, width)
 
 
 def items(stage: Stage, pixels: int) -> int:
@@ -115,6 +132,14 @@ def items(stage: Stage, pixels: int) -> int:
 
 def _pixels(stage: Stage) -> int:
     return PIXELS["gpu" if stage.device.kind == "gpu" else "cpu"]
+
+
+def _scene_source() -> str:
+    """What kernels call the table of buffers: SCENE, SCENE_HERE and scene_t."""
+    parameters = ", ".join(f"__global const {element} *restrict {name}" for name, element in SCENE)
+    fields = " ".join(f"__global const {element} *{name};" for name, element in SCENE)
+    here = ", ".join(name for name, _ in SCENE)
+    return f"#define SCENE {parameters}\n#define SCENE_HERE {{{here}}}\ntypedef struct {{ {fields} }} scene_t;\n"
 
 
 def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constants: float):
@@ -127,7 +152,7 @@ def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constan
         "PIXELS": _pixels(stage), "CANDIDATES": CANDIDATES, "STRIDE": STRIDE, "SKY_CELLS": SKY_CELLS,
         "TURN_COSINE": float(np.cos(2 * np.pi / CANDIDATES)), "TURN_SINE": float(np.sin(2 * np.pi / CANDIDATES)),
     }  # fmt: skip
-    text = ocl.struct_source(stage.device, (("view_t", VIEW), *structs)) + ocl.source(*BASE, *names)
+    text = ocl.struct_source(stage.device, (("view_t", VIEW), *structs)) + _scene_source() + ocl.source(*BASE, *names)
     whole = {name: value for name, value in (fixed | constants).items() if isinstance(value, int)}
     reals = {name: value for name, value in (fixed | constants).items() if isinstance(value, float)}
     return ocl.kernel(stage.device, entry, "".join(f"#define {n} {v:.9e}f\n" for n, v in reals.items()) + text, whole)

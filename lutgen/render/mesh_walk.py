@@ -131,7 +131,7 @@ def _staged(on: Stage, seed: int, facts: dict, depths: tuple) -> sample_queue.St
     medium = replace(medium, nu_per_mm=least_absorption(on))
     waves = device_scene.waves(on.luts, on.luts.oxygenation)
     waves[:, device_scene.NU] = medium.nu_per_mm
-    here = replace(on, arguments=(*on.arguments[:-1], ocl.buffer(on.device, waves)))
+    here = replace(on, buffers=on.buffers | {"waves": ocl.buffer(on.device, waves)})
 
     def step(entries, exits, part: sample_queue.Part) -> int:
         """Walk a part and say how many events that took."""
@@ -149,9 +149,7 @@ def least_absorption(on: Stage) -> np.ndarray:
     It is linear in melanosome and blood fractions and in the eumelanin ratio, so least where each is least or most.
     """
     columns, rows = on.view["chromophore_size"]
-    ratios = ocl.read(on.device, on.arguments[device_scene.CHROMOPHORE_MAP], np.empty((rows, columns, 4), "f2"))[
-        ..., :3
-    ]
+    ratios = ocl.read(on.device, on.buffers["chromophore_map"], np.empty((rows, columns, 4), "f2"))[..., :3]
     ends = np.stack([ratios.min(axis=(0, 1)), ratios.max(axis=(0, 1))]).astype(float)
     allowed = on.view["chromophores_low"].astype(float), on.view["chromophores_high"].astype(float)
     skins = np.clip(on.view["chromophores"] * ends, *allowed)
