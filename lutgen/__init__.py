@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from lutgen.fitting import Fit, fit
     from lutgen.skin.tissue import PRESETS, Layer, Skin, layers, preset
     from lutgen.solvers import linear_srgb, profile, reflectance, spectrum
-    from lutgen.solvers.profiles import Profile
-    from lutgen.solvers.result import Reflectance
+    from lutgen.solvers.profiles import Profile, Reflectance
     from lutgen.tables.axes import Axis, Grid
     from lutgen.tables.bake import bake
     from lutgen.tables.lut_set import LutSet
@@ -27,8 +26,7 @@ _WHERE = {
     "fitting": ("Fit", "fit"),
     "skin.tissue": ("PRESETS", "Layer", "Skin", "layers", "preset"),
     "solvers": ("linear_srgb", "profile", "reflectance", "spectrum"),
-    "solvers.profiles": ("Profile",),
-    "solvers.result": ("Reflectance",),
+    "solvers.profiles": ("Profile", "Reflectance"),
     "tables.axes": ("Axis", "Grid"),
     "tables.bake": ("bake",),
     "tables.lut_set": ("LutSet",),

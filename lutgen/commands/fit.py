@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from dataclasses import asdict
 
 from lutgen import color, fitting
 from lutgen.commands import Outcome, png_options, skin_options
 from lutgen.errors import InputError, one_of
-from lutgen.fitting import Fit, measured
-from lutgen.skin.tissue import Skin
+from lutgen.fitting import BASE, Fit, measured
+from lutgen.skin.tissue import plain
 
 EXAMPLES = (
     "lutgen fit '#c09584'",
     "lutgen fit lab:62,10,18 --eumelanin 0.8 --png fit.png",
     "lutgen fit spectrum.csv --specular-included --parameters melanin,hemoglobin,oxygenation",
 )
-BASE = Skin(0.02, 0.7, 0.01)
-"""What has the parameters that are neither fitted nor on the command line."""
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -92,7 +89,7 @@ def _as_json(solution: Fit, options: Namespace) -> dict:
         "parameters": solution.parameters, "sigma": solution.sigma,
         "correlation": {name: dict(zip(names, row, strict=True)) for name, row in rows},
         "delta_e00": solution.delta_e00, "rmse": solution.rmse, "notes": list(solution.notes),
-        "skin": asdict(solution.skin), "given_as": data.space, "specular_included": options.specular_included,
+        "skin": plain(solution.skin), "given_as": data.space, "specular_included": options.specular_included,
         "noise": options.noise, "wavelength_nm": solution.wavelength_nm.tolist(), **sides,
     }  # fmt: skip
 

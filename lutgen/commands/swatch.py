@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from dataclasses import asdict
 
 from lutgen import color, solvers
 from lutgen.commands import Outcome, device_options, png_options, skin_options
 from lutgen.errors import InputError
-from lutgen.skin.tissue import PRESETS, Skin, preset
+from lutgen.skin.tissue import PRESETS, Skin, plain, preset
 from lutgen.solvers.paths import PHOTONS, SEEDS
 
 EXAMPLES = (
@@ -61,7 +60,7 @@ def run(options: Namespace) -> Outcome:
     xyz = color.spectrum_to_xyz(reflectance, options.pipeline)
     srgb = color.from_xyz(xyz, "srgb", options.pipeline)
     result = {
-        "skin": asdict(skin), "method": options.method, "pipeline": options.pipeline,
+        "skin": plain(skin), "method": options.method, "pipeline": options.pipeline,
         "wavelength_nm": color.tables()["wavelength_nm"].tolist(), "reflectance": reflectance.tolist(),
         "std_error": sigma.tolist(), "xyz": xyz.tolist(), "linear_srgb": srgb.tolist(),
         "lab": color.lab(xyz).tolist(), "srgb_hex": color.hex_code(srgb),

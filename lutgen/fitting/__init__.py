@@ -15,14 +15,15 @@ import numpy as np
 
 from lutgen import color
 from lutgen.errors import InputError, in_range, one_of, shown
-from lutgen.fitting import least_squares, measured, nearest, uncertainty
+from lutgen.fitting import least_squares, measured, nearest
 from lutgen.fitting.measured import Measured
 from lutgen.fitting.nearest import CUBE_ROOT, PARAMETERS, Problem
-from lutgen.skin.tissue import REFRACTIVE_INDEX, Skin
+from lutgen.skin.tissue import Skin, specular
 
+BASE = Skin(0.02, 0.7, 0.01)
+"""What has the parameters that are not fitted, where no other skin is given."""
 OF_SPECTRUM, OF_COLOR = ("melanin", "hemoglobin", "oxygenation"), ("melanin", "hemoglobin")
 """What is fitted unless said otherwise; a color hardly shows its oxygenation."""
-SPECULAR = ((REFRACTIVE_INDEX - 1) / (REFRACTIVE_INDEX + 1)) ** 2
 SKIN, NO_SKIN = 2.0, 10.0
 """Difference from the nearest skin up to which a measurement is one's, and from which it is refused (CIEDE2000, and
 root mean square lightness of a spectrum): the Monk scale's ten tones lie up to 9.3 away, black 10.5, white 14."""
@@ -84,13 +85,13 @@ def fit(
     (0.0439, 0.0093, 0.7)
     """
     data = measured.read(data)
-    base = Skin(0.02, 0.7, 0.01) if base is None else base
+    base = BASE if base is None else base
     if not isinstance(base, Skin):
         raise InputError(f"base = {shown(base)}: a lutgen.Skin is needed; lutgen.preset(name) gives one")
     if noise is not None:
         noise = in_range("noise", noise, *NOISE["color" if data.reflectance is None else "spectrum"])
     names = _names(parameters, data, noise)
-    task = nearest.problem(data, names, base, SPECULAR if specular_included else 0.0)
+    task = nearest.problem(data, names, base, specular(base.refractive_index) if specular_included else 0.0)
     at = nearest.solve(task)
     values = {name: float(value[0]) for name, value in task.values(at[None]).items()}
     reflectance = task.spectra(at[None])[0]
@@ -137,7 +138,7 @@ def _spread(task: Problem, at: np.ndarray, free: np.ndarray, noise: float | None
         own, of_color = task.slopes(found)
         inverse = np.linalg.pinv(np.concatenate([own[:, None] * slope, of_color @ slope]), rcond=1e-9)
         solution = inverse[:, : len(found)] * own + inverse[:, len(found) :] @ of_color
-        inner, alike = uncertainty.covariance(solution, slope, task.data.reflectance - found, noise)
+        inner, alike = least_squares.covariance(solution, slope, task.data.reflectance - found, noise)
     spread, correlation = np.zeros(len(at)), np.zeros((len(at), len(at)))
     spread[free] = np.sqrt(np.diag(inner))
     correlation[np.ix_(free, free)] = inner / np.maximum(np.outer(spread[free], spread[free]), 1e-300)

@@ -9,8 +9,8 @@ noise is up to twice, hemoglobin's 1.6 times as large.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -51,6 +51,10 @@ class Problem:
     low: np.ndarray
     high: np.ndarray
 
+    @cached_property
+    def _exact(self) -> exact_totals.ExactTotals:
+        return exact_totals.exact_totals(self.base.tissue)
+
     def values(self, points: np.ndarray) -> dict[str, np.ndarray]:
         """The fitted parameters [B] at points [B, P]."""
         found = {name: column ** _power(name) for name, column in zip(self.names, points.T, strict=True)}
@@ -59,9 +63,8 @@ class Problem:
     def spectra(self, points: np.ndarray) -> np.ndarray:
         """The model's reflectance [B, n] at points [B, P]."""
         of = {name: np.full(len(points), getattr(self.base, name)) for name in PARAMETERS} | self.values(points)
-        plain = replace(self.base, melanin=0.01, eumelanin=0.7, hemoglobin=0.01, oxygenation=0.7)
         found = exact_totals.spectra(
-            _table(plain), self.wavelength_nm, of["melanin"], of["eumelanin"], of["hemoglobin"], of["oxygenation"]
+            self._exact, self.wavelength_nm, of["melanin"], of["eumelanin"], of["hemoglobin"], of["oxygenation"]
         )
         return found + self.offset
 
@@ -121,8 +124,3 @@ def solve(task: Problem) -> np.ndarray:
 
 def _power(name: str) -> int:
     return 3 if name in CUBE_ROOT else 1
-
-
-@lru_cache(maxsize=4)
-def _table(plain: Skin) -> exact_totals.ExactTotals:
-    return exact_totals.exact_totals(plain)

@@ -11,6 +11,7 @@ import numpy as np
 from lutgen.planning import costs, prediction
 from lutgen.planning.needs import Needs
 from lutgen.planning.prediction import Colors, Profiles
+from lutgen.solvers import exact_totals
 from lutgen.tables import wavelengths
 from lutgen.tables.axes import Axis, Grid
 from lutgen.tables.recipe import Recipe
@@ -75,7 +76,7 @@ class Judge:
 
 def judge(needs: Needs) -> Judge:
     """What judges recipes for a scene."""
-    colors, profiles = Colors(needs, prediction.exact_totals(Recipe().skin)), Profiles(needs)
+    colors, profiles = Colors(needs, exact_totals.exact_totals(Recipe().skin)), Profiles(needs)
     coarse_color = coarsest(needs, lambda alone, grid: Colors(alone, colors.exact).interpolation(_PLAIN, grid))
     coarse_profile = coarsest(needs, lambda alone, grid: Profiles(alone).interpolation(_PLAIN, grid))
     with_profile = profiles.unscattered() > needs.ee_tolerance

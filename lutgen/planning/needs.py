@@ -12,11 +12,10 @@ from lutgen.errors import InputError, in_range, one_of, shown, whole
 from lutgen.files import texture_maps
 from lutgen.skin import chromophores
 from lutgen.skin.tissue import PRESETS
-from lutgen.tables.axes import ALLOWED
 
 Range = tuple[float, float]
 
-ALLOWED_TONES: dict[str, Range] = {**ALLOWED, "oxygenation": chromophores.OXYGENATION}
+ALLOWED_TONES: dict[str, Range] = {**chromophores.RANGES, "oxygenation": chromophores.OXYGENATION}
 VARIABLE = tuple(ALLOWED_TONES)
 USUAL = {name: getattr(PRESETS["light"], name) for name in VARIABLE}
 """The value of what neither the tones nor `vary` name: the default recipe's skin."""
@@ -119,7 +118,7 @@ def scene(
     """
     parts = [part.strip() for part in tones.split(",") if part.strip()]
     named = _varied(vary)
-    spans, ratios = _parts(parts, ALLOWED if vary is None else named)
+    spans, ratios = _parts(parts, chromophores.RANGES if vary is None else named)
     ranges = {name: spans.get(name, (USUAL[name],) * 2) for name in VARIABLE}
     for name in named:
         if ranges[name][0] == ranges[name][1]:
@@ -147,10 +146,10 @@ def _parts(parts: list[str], whole_of: Iterable[str]) -> tuple[dict[str, Range],
     for part in parts:
         name, equals, value = part.partition("=")
         if part == "all":
-            spans.update({key: ALLOWED[key] for key in ALLOWED if key in whole_of})
+            spans.update({key: chromophores.RANGES[key] for key in chromophores.NAMES if key in whole_of})
         elif part in PRESETS:
             skin = PRESETS[part]
-            for key in ALLOWED:
+            for key in chromophores.NAMES:
                 low, high = spans.get(key, (np.inf, -np.inf))
                 spans[key] = min(low, getattr(skin, key)), max(high, getattr(skin, key))
         elif equals:

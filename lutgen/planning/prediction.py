@@ -8,7 +8,7 @@ the noise of a trace the paths hold every covariance, so that it can be drawn wi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
@@ -16,9 +16,8 @@ from lutgen import color
 from lutgen.planning import stored_paths
 from lutgen.planning.needs import Needs, panel
 from lutgen.skin import chromophores
-from lutgen.skin.tissue import REFRACTIVE_INDEX, Skin
-from lutgen.solvers import exact_totals as totals
-from lutgen.solvers import profiles
+from lutgen.skin.tissue import specular
+from lutgen.solvers import exact_totals, profiles
 from lutgen.tables import expand, wavelengths
 from lutgen.tables.axes import Grid
 
@@ -28,12 +27,6 @@ BAKES = 8
 COLOR_SKINS, PROFILE_SKINS, DRAWS, SEED = 1500, 96, 512, 0
 FARTHEST = 3
 """Draws whose mean stands for the quantile .98^(1/8) = .9975: of 512 the largest three lie about there."""
-
-
-@cache
-def exact_totals(skin: Skin) -> totals.ExactTotals:
-    """The table of exact totals, made once per setting."""
-    return totals.exact_totals(skin)
 
 
 def p95(errors: np.ndarray) -> float:
@@ -46,7 +39,7 @@ class Colors:
     """Color errors of LUTs for a scene, 95th percentile of ΔE00 over its skins, at the worst of its oxygenations."""
 
     needs: Needs
-    exact: totals.ExactTotals
+    exact: exact_totals.ExactTotals
 
     @cached_property
     def skins(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,7 +51,7 @@ class Colors:
         """Lab [P, 3] from spectra every 5 nm, per oxygenation."""
         nm, weights = color.xyz_weights(5)
         return [
-            color.lab(totals.spectra(self.exact, nm, *self.skins, oxygenation) @ weights)
+            color.lab(exact_totals.spectra(self.exact, nm, *self.skins, oxygenation) @ weights)
             for oxygenation in self.needs.oxygenations
         ]
 
@@ -66,7 +59,7 @@ class Colors:
         """Error of a rule's wavelengths alone."""
         chosen = wavelengths.load(rule)
         found = [
-            totals.spectra(self.exact, chosen.wavelength_nm, *self.skins, oxygenation) @ chosen.xyz_weights
+            exact_totals.spectra(self.exact, chosen.wavelength_nm, *self.skins, oxygenation) @ chosen.xyz_weights
             for oxygenation in self.needs.oxygenations
         ]
         return self._worst(found, self.truth)
@@ -80,7 +73,9 @@ class Colors:
         """Error of interpolation alone: against the same wavelengths at the skins themselves."""
         chosen = wavelengths.load(rule)
         truth = [
-            color.lab(totals.spectra(self.exact, chosen.wavelength_nm, *self.skins, oxygenation) @ chosen.xyz_weights)
+            color.lab(
+                exact_totals.spectra(self.exact, chosen.wavelength_nm, *self.skins, oxygenation) @ chosen.xyz_weights
+            )
             for oxygenation in self.needs.oxygenations
         ]
         return self._worst([grid.interpolate(values, *self.skins) for values in self.cells(rule, grid)], truth)
@@ -90,7 +85,7 @@ class Colors:
         chosen, rng = wavelengths.load(rule), np.random.default_rng(SEED)
         nm, found, right = chosen.wavelength_nm, [], []
         nu = np.minimum(chromophores.epidermis_range(nm)[0], chromophores.dermis_range(nm)[0])[:, None]
-        entry = 1 - ((REFRACTIVE_INDEX - 1) / (REFRACTIVE_INDEX + 1)) ** 2
+        entry = 1 - specular(self.exact.tissue.refractive_index)
         for oxygenation in self.needs.oxygenations:
             mu = expand.coefficients(nm, expand.absorbers(nm, oxygenation), *self.skins)
             R, doubled = self.exact(nm, *mu), self.exact(nm, *(2 * v - nu for v in mu))

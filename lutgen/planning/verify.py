@@ -72,7 +72,7 @@ def reference_photons(recipe: Recipe) -> int:
 
 def truth(needs: Needs, recipe: Recipe, traced: PathTable) -> Truth:
     """Skins drawn within a recipe's axes, as a bake draws them, and what is right about them."""
-    exact = prediction.exact_totals(Recipe().skin)
+    exact = exact_totals.exact_totals(Recipe().skin)
     skins = bake.random_skins(recipe.color, COLOR_SKINS, SKINS_SEED)
     few = bake.random_skins(recipe.color, PROFILE_SKINS, SKINS_SEED + 1)
     nm, weights = color.xyz_weights(5)

@@ -14,7 +14,6 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.errors import MachineError
-from lutgen.skin.tissue import Skin
 from lutgen.solvers import path_table, profiles
 from lutgen.solvers.paths import PHOTONS
 from lutgen.tables import bake, expand
@@ -98,8 +97,7 @@ def trace(
 
     Deterministic: the seed and the entry angle key the random streams.
     """
-    facts = luts.manifest["recipe"]["skin"]
-    medium, _ = bake.skin_medium(Skin(0.02, 0.7, 0.01, **facts), luts.paths.wavelength_nm)
+    medium, _ = bake.skin_medium(luts.tissue, luts.paths.wavelength_nm)
     edges = profiles.ring_edges(RINGS, last_mm=60.0) if edges is None else edges
     cosines = entry_cosines(medium.n, angles)
     tally = path_table.Tally()

@@ -13,7 +13,6 @@ import numpy as np
 from lutgen import device as ocl
 from lutgen.render import device_scene, distance, sample_queue
 from lutgen.render.device_scene import Stage
-from lutgen.skin.tissue import Skin
 from lutgen.solvers import path_table
 from lutgen.solvers.path_table import Medium
 from lutgen.tables import bake, expand
@@ -114,8 +113,7 @@ def flat(on: Stage, seed: int = 0) -> sample_queue.Staged:
 
 def inside(on: Stage, seed: int = 0) -> sample_queue.Staged:
     """Walks inside the stage's mesh; InputError for one with holes."""
-    facts = on.luts.manifest["recipe"]["skin"]
-    depths = distance.of_mesh(on.shape.positions_mm, on.shape.triangles, facts["epidermis_mm"], on.device)
+    depths = distance.of_mesh(on.shape.positions_mm, on.shape.triangles, on.luts.tissue.epidermis_mm, on.device)
     told = {
         "walk": "mesh",
         "depth_cell_mm": depths.spacing_mm,
@@ -126,8 +124,8 @@ def inside(on: Stage, seed: int = 0) -> sample_queue.Staged:
 
 
 def _staged(on: Stage, seed: int, facts: dict, depths: tuple) -> sample_queue.Staged:
-    skin, tally = on.luts.manifest["recipe"]["skin"], Tally()
-    medium, _ = bake.skin_medium(Skin(0.02, 0.7, 0.01, **skin), on.luts.paths.wavelength_nm)
+    tally = Tally()
+    medium, _ = bake.skin_medium(on.luts.tissue, on.luts.paths.wavelength_nm)
     medium = replace(medium, nu_per_mm=least_absorption(on))
     waves = device_scene.waves(on.luts, on.luts.oxygenation)
     waves[:, device_scene.NU] = medium.nu_per_mm

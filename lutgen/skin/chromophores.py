@@ -10,9 +10,12 @@ from importlib.resources import files
 
 import numpy as np
 
-MELANIN = (0.001, 0.5)
-EUMELANIN = (0.0, 1.0)
-HEMOGLOBIN = (0.001, 0.1)
+RANGES = {"melanin": (0.001, 0.5), "eumelanin": (0.0, 1.0), "hemoglobin": (0.001, 0.1)}
+"""What the axes of a LUT may span: shares of melanosomes in the epidermis, of eumelanin among them, of blood in the
+dermis."""
+NAMES = tuple(RANGES)
+"""The chromophores of a skin in the order in which functions take them; arrays over a grid have them reversed."""
+MELANIN, EUMELANIN, HEMOGLOBIN = RANGES.values()
 OXYGENATION = (0.0, 1.0)
 WAVELENGTH_NM = (380.0, 780.0)
 

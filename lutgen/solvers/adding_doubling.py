@@ -15,7 +15,7 @@ import numpy as np
 
 from lutgen.errors import InputError, whole
 from lutgen.skin.tissue import Layer
-from lutgen.solvers.result import Reflectance
+from lutgen.solvers.profiles import Reflectance
 
 NODES = 16
 """Quadrature nodes in each interval between critical cosines: within 1e-6 of 32 nodes on skin (12: 1e-6, 8: 1e-4)."""

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lutgen.errors import InputError
-from lutgen.skin.tissue import Layer
-from lutgen.solvers.profiles import Profile
-from lutgen.solvers.result import Reflectance
+from lutgen.skin.tissue import Layer, specular
+from lutgen.solvers.profiles import Profile, Reflectance
 
 OPTIONS = ("unsafe", "wavelength_nm")
 
@@ -73,11 +72,6 @@ def mismatch(n: float) -> float:
     """
     inside = -1.440 / n**2 + 0.710 / n + 0.668 + 0.0636 * n
     return (1 + inside) / (1 - inside)
-
-
-def specular(n: float) -> float:
-    """Specular reflectance of light along the normal from air."""
-    return ((n - 1) / (n + 1)) ** 2
 
 
 def least_albedo(n: float) -> float:

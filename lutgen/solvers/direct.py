@@ -17,11 +17,10 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.errors import InputError, MachineError, in_range, one_of, whole
-from lutgen.skin.tissue import Layer
+from lutgen.skin.tissue import Layer, specular
 from lutgen.solvers.path_table import RESULT
 from lutgen.solvers.paths import PHOTONS, SEEDS
-from lutgen.solvers.profiles import Profile
-from lutgen.solvers.result import Reflectance
+from lutgen.solvers.profiles import Profile, Reflectance
 
 ABSORPTION = ("albedo", "continuous", "mixed")
 THRESHOLD, SURVIVORS = 1e-4, 10.0
@@ -157,10 +156,9 @@ def shares(layers: list[Layer], photons: int = 100_000, seed: int = 0, **options
     mean = np.asarray(sums) / photons
     error = np.sqrt(np.maximum(np.asarray(squares) / photons - mean**2, 0) / photons)
     total_error = float(np.sqrt(max(total_square / photons - (total / photons) ** 2, 0) / photons))
-    specular = ((layers[0].n - 1) / (layers[0].n + 1)) ** 2
     return Shares(
-        float(mean[0]), specular, float(mean[1]), mean[2:], float(error[0]), float(error[1]), error[2:], total_error,
-        events,
+        float(mean[0]), specular(layers[0].n), float(mean[1]), mean[2:], float(error[0]), float(error[1]), error[2:],
+        total_error, events,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Exact diffuse reflectance of one kind of two-layer skin at any wavelength and absorption, fast enough for a bake.
+"""Exact diffuse reflectance of one tissue at any wavelength and absorption, fast enough for a bake.
 
 Reflectance is smooth in wavelength (through scattering alone) and in the cube roots of both absorptions, so a table
 at Chebyshev nodes of all three, filled by adding-doubling, stands for every spectrum. Measured over the whole
@@ -7,12 +7,13 @@ allowed range with 10 x 24 x 24 nodes: within 3e-6 of the solver at an epidermis
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from lutgen.skin import chromophores
-from lutgen.skin.tissue import REFRACTIVE_INDEX, Skin, scattering
+from lutgen.skin.tissue import Tissue, dermis_scattering, scattering
 from lutgen.solvers import adding_doubling
 from lutgen.solvers.paths import chebyshev, interpolation_matrix
 
@@ -23,8 +24,9 @@ _MARGIN = 2.2  # absorption is covered up to this times the greatest allowed: pa
 
 @dataclass(frozen=True)
 class ExactTotals:
-    """Table [W, E, D] of diffuse reflectance at Chebyshev nodes of wavelength and cube-root absorption."""
+    """Table [W, E, D] of a tissue's diffuse reflectance at Chebyshev nodes of wavelength and cube-root absorption."""
 
+    tissue: Tissue
     wavelength_nm: np.ndarray
     root_epidermis: np.ndarray
     root_dermis: np.ndarray
@@ -51,21 +53,26 @@ class ExactTotals:
         )
 
 
-def exact_totals(skin: Skin) -> ExactTotals:
-    """The table for a skin's epidermis thickness, scattering law and reading (its chromophores do not matter)."""
+def exact_totals(tissue: Tissue) -> ExactTotals:
+    """The table of a tissue; its oxygenation does not matter. The last few are kept."""
+    return _computed(replace(tissue, oxygenation=Tissue.oxygenation))
+
+
+@lru_cache(maxsize=8)
+def _computed(tissue: Tissue) -> ExactTotals:
     nm = chebyshev(*chromophores.WAVELENGTH_NM, WAVELENGTHS)
     every = np.arange(*chromophores.WAVELENGTH_NM, 5.0)
     roots = [
         chebyshev(np.cbrt(low.min() * 0.98), np.cbrt(high.max() * _MARGIN), ABSORPTIONS)
         for low, high in (chromophores.epidermis_range(every), chromophores.dermis_range(every))
     ]
-    mu_s, g = scattering(skin, nm)
-    dermis_mu_s = mu_s / 2 if skin.scattering == "donner" else None
+    mu_s, g = scattering(tissue, nm)
+    dermis_mu_s = dermis_scattering(tissue, mu_s)
     mu_e, mu_d = (np.broadcast_to(root**3, (WAVELENGTHS, ABSORPTIONS)) for root in roots)
     table = adding_doubling.two_layer_grid(
-        skin.epidermis_mm, mu_e, mu_d, mu_s, g, REFRACTIVE_INDEX, dermis_mu_s, nodes=_STREAMS
+        tissue.epidermis_mm, mu_e, mu_d, mu_s, g, tissue.refractive_index, dermis_mu_s, nodes=_STREAMS
     )
-    return ExactTotals(nm, roots[0], roots[1], table)
+    return ExactTotals(tissue, nm, roots[0], roots[1], table)
 
 
 def spectra(exact: ExactTotals, wavelength_nm: np.ndarray, melanin, eumelanin, hemoglobin, oxygenation) -> np.ndarray:

@@ -12,11 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from lutgen.errors import InputError
-from lutgen.skin.tissue import Layer
+from lutgen.skin.tissue import Layer, specular
 from lutgen.solvers import dipole
 from lutgen.solvers.dipole import Diffusion
-from lutgen.solvers.profiles import Profile
-from lutgen.solvers.result import Reflectance
+from lutgen.solvers.profiles import Profile, Reflectance
 
 OPTIONS = ("unsafe", "wavelength_nm")
 
@@ -165,7 +164,7 @@ def reflectance(
     0.5802
     """
     pair = _checked(layers, unsafe)
-    surface = dipole.specular(pair[0].n)
+    surface = specular(pair[0].n)
     return Reflectance((1 - surface) * _encircled(pair, np.inf), surface)
 
 
@@ -189,5 +188,5 @@ def profile(
     # Rings may fall below 0 by rounding, and for slabs that only `unsafe` lets in because the flux there is taken
     # below a fluence that peaks above the surface. Cutting encircled energy at the total keeps the sum.
     within = np.maximum.accumulate(np.clip(within, 0, _encircled(pair, np.inf)))
-    energy = (1 - dipole.specular(pair[0].n)) * np.diff(within)
+    energy = (1 - specular(pair[0].n)) * np.diff(within)
     return Profile(edges, energy, np.zeros_like(energy))

@@ -15,10 +15,9 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.errors import InputError, MachineError, in_range, whole
-from lutgen.skin.tissue import Layer
+from lutgen.skin.tissue import Layer, specular
 from lutgen.solvers.paths import PHOTONS, SEEDS, PathTable, chebyshev
-from lutgen.solvers.profiles import Profile
-from lutgen.solvers.result import Reflectance
+from lutgen.solvers.profiles import Profile, Reflectance
 
 OPTIONS = ("device", "wavelength_nm")
 BLOCK_PHOTONS = {"cpu": 2048, "gpu": 128}
@@ -54,7 +53,7 @@ class Medium:
     @property
     def entry(self) -> float:
         """Share of light along the normal that enters: 1 - R_specular."""
-        return 1 - ((self.n - 1) / (self.n + 1)) ** 2
+        return 1 - specular(self.n)
 
 
 @dataclass

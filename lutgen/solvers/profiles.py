@@ -1,4 +1,4 @@
-"""Radial diffuse profiles: where the light that enters at a point comes out again."""
+"""What solvers return: shares of light, and radial profiles of where light that enters at a point comes out again."""
 
 from __future__ import annotations
 
@@ -8,6 +8,20 @@ import numpy as np
 
 COMPARED_FROM_MM = 0.01
 """Profiles are compared from this radius on: what leaves nearer looks like a surface reflection."""
+
+
+@dataclass(frozen=True)
+class Reflectance:
+    """Shares of light that fell along the normal: diffuse, specular, transmitted; std_error is the diffuse share's.
+
+    >>> Reflectance(diffuse=0.29, specular=0.0278).transmitted
+    0.0
+    """
+
+    diffuse: float
+    specular: float
+    transmitted: float = 0.0
+    std_error: float = 0.0
 
 
 def ring_edges(rings: int = 64, first_mm: float = 1e-4, last_mm: float = 30.0) -> np.ndarray:

@@ -13,7 +13,6 @@ import numpy as np
 from lutgen.errors import InputError, in_range, shown, whole
 from lutgen.skin import chromophores
 
-ALLOWED = {"melanin": chromophores.MELANIN, "eumelanin": chromophores.EUMELANIN, "hemoglobin": chromophores.HEMOGLOBIN}
 MAX_COUNT = 256
 
 
@@ -34,7 +33,7 @@ class Axis:
     spacing: str = "linear"
 
     def __post_init__(self):
-        low, high = ALLOWED.get(self.name, (-1e300, 1e300))
+        low, high = chromophores.RANGES.get(self.name, (-1e300, 1e300))
         object.__setattr__(self, "count", whole(f"{self.name} axis: count", self.count, 1, MAX_COUNT))
         object.__setattr__(self, "low", in_range(f"{self.name} axis: low", self.low, low, high))
         object.__setattr__(self, "high", in_range(f"{self.name} axis: high", self.high, low, high))
@@ -128,31 +127,36 @@ class Grid:
     hemoglobin: Axis
 
     def __post_init__(self):
-        for name in ("melanin", "eumelanin", "hemoglobin"):
+        for name in chromophores.NAMES:
             if getattr(self, name).name != name:
                 raise InputError(f"{name} = the {getattr(self, name).name} axis: a grid takes each axis by its name")
 
     @property
+    def axes(self) -> tuple[Axis, Axis, Axis]:
+        """The axes as arrays are ordered: (hemoglobin, eumelanin, melanin)."""
+        return self.hemoglobin, self.eumelanin, self.melanin
+
+    @property
     def shape(self) -> tuple[int, int, int]:
         """Node counts as arrays are ordered: (hemoglobin, eumelanin, melanin)."""
-        return self.hemoglobin.count, self.eumelanin.count, self.melanin.count
+        hemoglobin, eumelanin, melanin = self.axes
+        return hemoglobin.count, eumelanin.count, melanin.count
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Melanin, eumelanin and hemoglobin of every node, each [N_h, N_e, N_m]."""
-        h, e, m = np.meshgrid(self.hemoglobin.values, self.eumelanin.values, self.melanin.values, indexing="ij")
+        h, e, m = np.meshgrid(*(axis.values for axis in self.axes), indexing="ij")
         return m, e, h
 
     def interpolate(self, cells: np.ndarray, melanin, eumelanin, hemoglobin) -> np.ndarray:
         """Trilinear interpolation of cells [N_h, N_e, N_m, ...] at broadcast parameter values, clamped to the grid."""
-        m, e, h = np.broadcast_arrays(
-            self.melanin.position(melanin), self.eumelanin.position(eumelanin), self.hemoglobin.position(hemoglobin)
-        )
+        values = hemoglobin, eumelanin, melanin
+        positions = np.broadcast_arrays(*(axis.position(v) for axis, v in zip(self.axes, values, strict=True)))
         corners = []
-        for position, count in ((h, self.shape[0]), (e, self.shape[1]), (m, self.shape[2])):
+        for position, count in zip(positions, self.shape, strict=True):
             low = np.minimum(position.astype(int), max(count - 2, 0))
             corners.append(((low, 1 - (position - low)), (np.minimum(low + 1, count - 1), position - low)))
         tail = (...,) + (None,) * (cells.ndim - 3)
-        out = np.zeros(m.shape + cells.shape[3:])
+        out = np.zeros(positions[0].shape + cells.shape[3:])
         for ih, wh in corners[0]:
             for ie, we in corners[1]:
                 for im, wm in corners[2]:

@@ -13,13 +13,13 @@ import numpy as np
 
 from lutgen import color
 from lutgen import device as ocl
-from lutgen.skin import chromophores, tissue
+from lutgen.skin import chromophores
+from lutgen.skin.tissue import Tissue, require_one_scatterer, scattering
 from lutgen.solvers import exact_totals, path_table, profiles
 from lutgen.solvers.paths import PathTable, chebyshev
-from lutgen.tables import expand
-from lutgen.tables import recipe as recipes
-from lutgen.tables import wavelengths as quadrature
+from lutgen.tables import expand, wavelengths
 from lutgen.tables.lut_set import ColorLut, LutSet, ProfileLut
+from lutgen.tables.recipe import coerce
 from lutgen.tables.storage import MEANING, grid_entry
 
 CHECKED_SKINS = 1000
@@ -36,16 +36,16 @@ def bake(
 
     `device` picks the OpenCL device, `progress` is told each stage and each launch. Photons are traced in fixed
     blocks: `blocks_per_launch` changes the launches, never the result. `exact` are the exact totals of the recipe's
-    skin, where a caller has them already. Raises InputError and MachineError.
+    tissue, where a caller has them already. Raises InputError and MachineError.
 
     >>> import lutgen
     >>> luts = lutgen.bake({"photons": 2048, "wavelengths": "6"})
     >>> luts.color(0.02, 0.7, 0.01).shape
     (3,)
     """
-    recipe = recipes.coerce(recipe)
+    recipe = coerce(recipe)
     clock = _Clock(progress or (lambda stage, tally: None))
-    rule = quadrature.load(recipe.wavelengths, recipe.pipeline)
+    rule = wavelengths.load(recipe.wavelengths, recipe.pipeline)
     chosen = ocl.choose(device)
 
     clock.stage("trace")
@@ -76,31 +76,31 @@ def bake(
     return luts
 
 
-def skin_medium(skin: tissue.Skin, wavelength_nm: np.ndarray):
+def skin_medium(tissue: Tissue, wavelength_nm: np.ndarray):
     """What to trace at wavelengths [K], and the absorption ranges (epidermis, dermis) that every allowed skin spans.
 
     The life rate nu is the least absorption of any allowed skin, over all chromophores and oxygenations.
     """
-    tissue.require_one_scatterer(skin)
-    mu_s, g = tissue.scattering(skin, wavelength_nm)
+    require_one_scatterer(tissue)
+    mu_s, g = scattering(tissue, wavelength_nm)
     reach = chromophores.epidermis_range(wavelength_nm), chromophores.dermis_range(wavelength_nm)
     nu = np.minimum(reach[0][0], reach[1][0])
-    medium = path_table.Medium(wavelength_nm, mu_s, g, nu, skin.epidermis_mm, tissue.REFRACTIVE_INDEX)
+    medium = path_table.Medium(wavelength_nm, mu_s, g, nu, tissue.epidermis_mm, tissue.refractive_index)
     return medium, reach
 
 
 def paths_at_every_wavelength(
-    photons: int, radius_edges_mm: np.ndarray, seed: int, skin: tissue.Skin, device: ocl.Device | None = None,
-    wavelengths: int = 10,
+    photons: int, radius_edges_mm: np.ndarray, seed: int, tissue: Tissue, device: ocl.Device | None = None,
+    count: int = 10,
 ) -> PathTable:  # fmt: skip
-    """Paths at Chebyshev wavelengths that share absorption nodes, each covering all from 380 to 780 nm.
+    """Paths at `count` Chebyshev wavelengths that share absorption nodes, each covering all from 380 to 780 nm.
 
     Scattering is smooth in wavelength, so few stand for all: interpolated in it they serve every rule, with one noise.
     """
     (low, high), every = chromophores.WAVELENGTH_NM, np.arange(380.0, 781.0)
     spans = chromophores.epidermis_range(every), chromophores.dermis_range(every)
-    ends_e, ends_d = ((np.full(wavelengths, least.min()), np.full(wavelengths, most.max())) for least, most in spans)
-    medium, _ = skin_medium(skin, chebyshev(low, high, wavelengths))
+    ends_e, ends_d = ((np.full(count, least.min()), np.full(count, most.max())) for least, most in spans)
+    medium, _ = skin_medium(tissue, chebyshev(low, high, count))
     medium = replace(medium, nu_per_mm=np.minimum(ends_e[0], ends_d[0]))
     nodes = 2 * path_table.NODES_E, path_table.NODES_D  # melanin at 380 nm to none at 780: totals err by 3e-7
     return path_table.trace(medium, ends_e, ends_d, radius_edges_mm, photons, seed, device, nodes=nodes)

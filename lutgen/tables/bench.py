@@ -15,7 +15,7 @@ import numpy as np
 import lutgen
 from lutgen import device as ocl
 from lutgen.errors import MachineError
-from lutgen.skin.tissue import preset
+from lutgen.skin.tissue import Tissue
 from lutgen.solvers import path_table
 from lutgen.tables.bake import Progress, skin_medium
 
@@ -59,7 +59,7 @@ def trace(chosen: ocl.Device) -> dict:
 
 
 def _rate(device: ocl.Device, photons: int) -> tuple[float, float]:
-    medium, _ = skin_medium(preset("light"), _WAVELENGTHS_NM)
+    medium, _ = skin_medium(Tissue(), _WAVELENGTHS_NM)
     tally = path_table.Tally()
     start = time.perf_counter()
     path_table.walk_only(medium, photons, device, tally)

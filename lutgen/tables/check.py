@@ -12,7 +12,6 @@ from lutgen.errors import InputError
 from lutgen.solvers import exact_totals
 from lutgen.tables import expand, storage
 from lutgen.tables.lut_set import LutSet
-from lutgen.tables.recipe import from_dict
 
 NODES = 100
 SIGMAS = 5.0
@@ -83,13 +82,12 @@ def _monotone(luts: LutSet) -> Finding:
 
 def _nodes(luts: LutSet) -> Finding:
     """Random nodes against adding-doubling at the set's own wavelengths."""
-    skin = from_dict({"skin": luts.manifest["recipe"]["skin"]}).skin
     cells = [v.ravel() for v in luts.color_lut.grid.nodes()]
     pick = np.random.default_rng(0).choice(len(cells[0]), min(NODES, len(cells[0])), replace=False)
     melanin, eumelanin, hemoglobin = (v[pick] for v in cells)
     nm = luts.paths.wavelength_nm
     mu = expand.coefficients(nm, luts.absorbers, melanin, eumelanin, hemoglobin)
-    exact = exact_totals.exact_totals(skin)(nm, *mu)
+    exact = exact_totals.exact_totals(luts.tissue)(nm, *mu)
     allowed = SIGMAS * luts.color_std_error(melanin, eumelanin, hemoglobin) + SOLVER_TOLERANCE
     miss = np.abs(luts.color_lut.acescg.reshape(-1, 3)[pick] - exact.T @ luts.weights)
     worst = float((miss / allowed).max())

@@ -43,12 +43,26 @@ def absorbers(wavelength_nm: np.ndarray, oxygenation: float, extra: ExtraAbsorbe
     return Absorbers(oxygenation, **added)
 
 
-def coefficients(wavelength_nm: np.ndarray, absorb: Absorbers, melanin, eumelanin, hemoglobin):
+def epidermis_coefficients(wavelength_nm: np.ndarray, absorb: Absorbers, melanin, eumelanin) -> np.ndarray:
+    """Absorption of the epidermis [K, P] in 1/mm, of P skins (chromophore arrays [P])."""
+    own = chromophores.epidermis(wavelength_nm[:, None], np.asarray(melanin), np.asarray(eumelanin))
+    return own + absorb.epidermis[:, None]
+
+
+def dermis_coefficients(wavelength_nm: np.ndarray, absorb: Absorbers, hemoglobin) -> np.ndarray:
+    """Absorption of the dermis [K, P] in 1/mm, of P skins (hemoglobin [P])."""
+    own = chromophores.dermis(wavelength_nm[:, None], np.asarray(hemoglobin), absorb.oxygenation)
+    return own + absorb.dermis[:, None]
+
+
+def coefficients(
+    wavelength_nm: np.ndarray, absorb: Absorbers, melanin, eumelanin, hemoglobin
+) -> tuple[np.ndarray, np.ndarray]:
     """Absorption of epidermis and dermis, each [K, P] in 1/mm, of P skins (chromophore arrays [P])."""
-    nm = wavelength_nm[:, None]
-    mu_e = chromophores.epidermis(nm, np.asarray(melanin), np.asarray(eumelanin)) + absorb.epidermis[:, None]
-    mu_d = chromophores.dermis(nm, np.asarray(hemoglobin), absorb.oxygenation) + absorb.dermis[:, None]
-    return mu_e, mu_d
+    return (
+        epidermis_coefficients(wavelength_nm, absorb, melanin, eumelanin),
+        dermis_coefficients(wavelength_nm, absorb, hemoglobin),
+    )
 
 
 def rgb_weights(xyz_weights: np.ndarray) -> np.ndarray:
@@ -59,9 +73,8 @@ def rgb_weights(xyz_weights: np.ndarray) -> np.ndarray:
 def cells(paths: PathTable, grid: Grid, absorb: Absorbers, weights: np.ndarray) -> np.ndarray:
     """ACEScg energy [N_h, N_e, N_m, B, 3] of every node, per ring of the table."""
     m, e = np.meshgrid(grid.melanin.values, grid.eumelanin.values)
-    nm = paths.wavelength_nm
-    mu_e, _ = coefficients(nm, absorb, m.ravel(), e.ravel(), 0.01)
-    _, mu_d = coefficients(nm, absorb, 0.01, 0.0, grid.hemoglobin.values)
+    mu_e = epidermis_coefficients(paths.wavelength_nm, absorb, m.ravel(), e.ravel())
+    mu_d = dermis_coefficients(paths.wavelength_nm, absorb, grid.hemoglobin.values)
     energy = paths.grid(mu_e, mu_d, weights)
     return energy.reshape(*grid.shape, *energy.shape[2:])
 

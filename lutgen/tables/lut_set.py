@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from lutgen import color
 from lutgen.errors import InputError, in_range, numbers, one_of, shown
-from lutgen.skin.tissue import Skin
+from lutgen.skin import chromophores
+from lutgen.skin.tissue import Skin, Tissue
 from lutgen.solvers import profiles
 from lutgen.solvers.paths import PathTable
 from lutgen.solvers.profiles import Profile
@@ -55,10 +56,15 @@ class LutSet:
     paths: PathTable
     manifest: dict
 
+    @cached_property
+    def tissue(self) -> Tissue:
+        """What the LUTs stand for besides the chromophores of their axes."""
+        return Tissue(**self.manifest["recipe"]["skin"])
+
     @property
     def oxygenation(self) -> float:
         """Oxygenation of the blood that the LUTs stand for."""
-        return self.manifest["recipe"]["skin"]["oxygenation"]
+        return self.tissue.oxygenation
 
     @property
     def pipeline(self) -> str:
@@ -118,7 +124,10 @@ class LutSet:
         (64, 3)
         """
         one_of("space", space, color.SPACES)
-        skin = tuple(in_range(name, v, 0, 1) for name, v in zip(_NAMES, (melanin, eumelanin, hemoglobin), strict=True))
+        skin = tuple(
+            in_range(name, v, 0, 1)
+            for name, v in zip(chromophores.NAMES, (melanin, eumelanin, hemoglobin), strict=True)
+        )
         self._inside(self.profile_lut.grid, *skin)
         shape = self.profile_lut.grid.interpolate(self.profile_lut.shape, *skin)
         energy = shape * self.color(*skin, space="acescg")
@@ -190,19 +199,20 @@ class LutSet:
         (0.158, 0.7, 0.018)
         """
         if isinstance(skin, Skin):
-            for name, value in self.manifest["recipe"]["skin"].items():
+            for name, value in vars(self.tissue).items():
                 if getattr(skin, name) != value:
                     advice = "expand the set to it first" if name == "oxygenation" else "bake a set with it first"
                     raise InputError(f"{name} = {getattr(skin, name)}: these LUTs hold {value}; {advice}")
-            return skin.melanin, skin.eumelanin, skin.hemoglobin
+            return astuple(skin.chromophores)
         if not isinstance(skin, (tuple, list, np.ndarray)) or len(skin) != 3:
             raise InputError(f"skin = {shown(skin)}: a Skin or (melanin, eumelanin, hemoglobin) is needed")
         return tuple(skin)
 
     def _inside(self, grid: Grid, melanin, eumelanin, hemoglobin) -> tuple[np.ndarray, ...]:
         """The chromophores as arrays; InputError where they leave the axes or do not broadcast."""
-        arrays = [numbers(name, v) for name, v in zip(_NAMES, (melanin, eumelanin, hemoglobin), strict=True)]
-        for axis, values in zip((grid.melanin, grid.eumelanin, grid.hemoglobin), arrays, strict=True):
+        named = zip(chromophores.NAMES, (melanin, eumelanin, hemoglobin), strict=True)
+        arrays = [numbers(name, values) for name, values in named]
+        for axis, values in zip(grid.axes[::-1], arrays, strict=True):
             slack = 1e-9 * max(abs(axis.high), 1e-9)
             wrong = ~((values >= axis.low - slack) & (values <= axis.high + slack))
             if wrong.any():
@@ -213,9 +223,8 @@ class LutSet:
             np.broadcast_shapes(*(values.shape for values in arrays))
         except ValueError:
             shapes = ", ".join(str(values.shape) for values in arrays)
-            raise InputError(f"melanin, eumelanin, hemoglobin have shapes {shapes}: they must broadcast") from None
+            raise InputError(f"{', '.join(chromophores.NAMES)} have shapes {shapes}: they must broadcast") from None
         return tuple(arrays)
 
 
-_NAMES = ("melanin", "eumelanin", "hemoglobin")
 _OF_ITS_BAKE = ("seconds", "baked_at", "host")

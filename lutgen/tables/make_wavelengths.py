@@ -23,7 +23,7 @@ from scipy.optimize import nnls
 
 from lutgen import color
 from lutgen.skin import chromophores
-from lutgen.skin.tissue import REFRACTIVE_INDEX, Skin, scattering
+from lutgen.skin.tissue import Tissue, scattering
 from lutgen.solvers import exact_totals, path_table, profiles
 from lutgen.solvers.paths import PathTable, chebyshev, interpolation_matrix
 
@@ -31,8 +31,8 @@ STARTS = {6: 40, 8: 40, 12: 20}
 LATTICE_NM = np.arange(390.0, 731.0, 2.0)
 REFERENCE_NM = color.xyz_weights(5)[0]
 EVERY_NM = np.union1d(LATTICE_NM, REFERENCE_NM)
-BASE = Skin(0.02, 0.7, 0.01)
-# What the fit looks at: skins, their number, and their share of the sum of squares. The default setting leads.
+BASE = Tissue()
+# What the fit looks at: tissues, how many skins of each, and their share of the sum of squares. The default leads.
 SPECTRA = {
     "default": (BASE, 1500, 5.0),
     "oxygenation": (BASE, 800, 0.3),
@@ -145,7 +145,7 @@ def trace(seed: int) -> PathTable:
     epidermis, dermis = ((np.full(len(nm), low.min()), np.full(len(nm), high.max())) for low, high in ends)
     mu_s, g = scattering(BASE, nm)
     nu = np.minimum(epidermis[0], dermis[0])
-    medium = path_table.Medium(nm, mu_s, g, nu, BASE.epidermis_mm, REFRACTIVE_INDEX)
+    medium = path_table.Medium(nm, mu_s, g, nu, BASE.epidermis_mm, BASE.refractive_index)
     table = path_table.trace(medium, epidermis, dermis, RADIUS_EDGES_MM, PHOTONS, seed)
     every = np.zeros((len(EVERY_NM), 1))
     return replace(
@@ -283,8 +283,8 @@ def main() -> None:
     """Write quadrature.csv beside this script."""
     rng = np.random.default_rng(0)
     fitted, held = {}, {}
-    for name, (skin, count, _) in SPECTRA.items():
-        exact, wide = exact_totals.exact_totals(skin), name != "default"
+    for name, (tissue, count, _) in SPECTRA.items():
+        exact, wide = exact_totals.exact_totals(tissue), name != "default"
         fitted[name] = exact_totals.spectra(exact, EVERY_NM, *with_corners(random_skins(count, rng, wide)))
         held[name] = exact_totals.spectra(exact, EVERY_NM, *random_skins(HELD_OUT, rng, wide))
     rings = ring_spectra(trace(seed=0), with_corners(random_skins(PROFILES, rng)))

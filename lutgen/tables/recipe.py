@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 from lutgen.color import PIPELINES
 from lutgen.errors import InputError, one_of, shown, whole
-from lutgen.skin import tissue
-from lutgen.skin.tissue import Skin
+from lutgen.skin import chromophores
+from lutgen.skin.tissue import Skin, Tissue, plain, require_one_scatterer
 from lutgen.solvers.paths import PHOTONS, SEEDS
-from lutgen.tables import wavelengths as quadrature
+from lutgen.tables import wavelengths
 from lutgen.tables.axes import Grid, default_grid
 
 TOTALS = ("monte-carlo", "anchored")
@@ -24,7 +24,9 @@ RINGS = (8, 16, 32, 64, 128, 256)
 
 @dataclass(frozen=True)
 class Recipe:
-    """Everything a bake depends on; `photons` are per wavelength, `skin` sets all but the three LUT axes.
+    """Everything a bake depends on; `photons` are per wavelength, `skin` is all but the three LUT axes.
+
+    Of a Skin the tissue is taken.
 
     >>> Recipe().photons
     524288
@@ -38,32 +40,32 @@ class Recipe:
     rings: int = 64
     color: Grid = field(default_factory=lambda: default_grid(16, 8, 16))
     profile: Grid = field(default_factory=lambda: default_grid(16, 4, 8))
-    skin: Skin = field(default_factory=lambda: Skin(0.0195, 0.7, 0.0088))
+    skin: Tissue = field(default_factory=Tissue)
 
     def __post_init__(self):
         object.__setattr__(self, "photons", whole("photons", self.photons, *PHOTONS))
         object.__setattr__(self, "seed", whole("seed", self.seed, *SEEDS))
-        one_of("wavelengths", self.wavelengths, quadrature.NAMES)
+        one_of("wavelengths", self.wavelengths, wavelengths.NAMES)
         one_of("totals", self.totals, TOTALS)
         one_of("pipeline", self.pipeline, PIPELINES)
         if isinstance(self.rings, bool) or not isinstance(self.rings, int) or self.rings not in RINGS:
             raise InputError(f"rings = {shown(self.rings)}: allowed is {', '.join(map(str, RINGS))}")
-        tissue.require_one_scatterer(self.skin)
+        if isinstance(self.skin, Skin):
+            object.__setattr__(self, "skin", self.skin.tissue)
+        require_one_scatterer(self.skin)
 
     def as_dict(self) -> dict:
         """The recipe as nested plain values, as the manifest and TOML hold it."""
-        skin = {key: value for key, value in asdict(self.skin).items() if key in _SKIN_KEYS}
         grids = {
             name: {axis: {key: value for key, value in asdict(getattr(grid, axis)).items() if key in _AXIS_KEYS}
-                   for axis in _AXES}
+                   for axis in chromophores.NAMES}
             for name, grid in (("color", self.color), ("profile", self.profile))
         }  # fmt: skip
-        return {key: getattr(self, key) for key in _TOP_KEYS} | {"skin": skin} | grids
+        return {key: getattr(self, key) for key in _TOP_KEYS} | {"skin": plain(self.skin)} | grids
 
 
-_AXES = ("melanin", "eumelanin", "hemoglobin")
 _AXIS_KEYS = ("low", "high", "count", "spacing")
-_SKIN_KEYS = ("oxygenation", "epidermis_mm", "scattering", "reading", "saidi_a_per_mm", "saidi_b_nm4_per_mm")
+_SKIN_KEYS = tuple(field.name for field in fields(Tissue))
 _TOP_KEYS = ("photons", "wavelengths", "seed", "totals", "pipeline", "rings")
 
 QUALITIES = {
@@ -101,7 +103,7 @@ def from_dict(values: Mapping, base: Recipe | None = None) -> Recipe:
     changes["skin"] = replace(base.skin, **skin)
     for name in ("color", "profile"):
         axes = _table(name, values)
-        _known(name, axes, _AXES)
+        _known(name, axes, chromophores.NAMES)
         grid = getattr(base, name)
         changed = {}
         for axis in axes:

@@ -12,6 +12,7 @@ import numpy as np
 from lutgen.color import ACESCG_FROM_XYZ
 from lutgen.errors import InputError, shown
 from lutgen.files import exr, folders
+from lutgen.skin import chromophores
 from lutgen.solvers.paths import PathTable
 from lutgen.tables.axes import Axis, Grid
 from lutgen.tables.lut_set import ColorLut, LutSet, ProfileLut
@@ -44,7 +45,7 @@ MEANING = {
 
 def grid_entry(grid: Grid) -> dict:
     """A grid's axes as plain values."""
-    return {name: asdict(getattr(grid, name)) for name in ("melanin", "eumelanin", "hemoglobin")}
+    return {name: asdict(getattr(grid, name)) for name in chromophores.NAMES}
 
 
 def _grid(entry: dict) -> Grid:

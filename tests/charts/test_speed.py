@@ -34,8 +34,7 @@ def test_a_jury_of_cells_holds_their_corners_and_skins_inside():
 
 def test_the_truth_of_a_jury_is_adding_doubling_at_5_nm():
     for i in (0, 50):
-        m, e, h = PANEL.skins[:, i]
-        skin = replace(methods.RECIPE.skin, melanin=float(m), eumelanin=float(e), hemoglobin=float(h))
+        skin = tissue.skin_of(tissue.Chromophores(*PANEL.skins[:, i]), methods.RECIPE.skin)
         R = [adding_doubling.reflectance(tissue.layers(skin, nm)).diffuse for nm in np.arange(380.0, 781.0, 5.0)]
         assert color.delta_e00(color.lab(color.spectrum_to_xyz(R)), PANEL.lab[i]) < 0.01
 

@@ -8,10 +8,12 @@ from scipy.optimize import least_squares as scipy_least_squares
 
 import lutgen
 from lutgen import color, fitting
-from lutgen.fitting import least_squares, measured, nearest, uncertainty
+from lutgen.fitting import least_squares, measured, nearest
+from lutgen.skin.tissue import specular
 from lutgen.solvers import exact_totals
 
 NM = np.arange(400.0, 701, 10)
+SPECULAR = specular(1.4)
 NAMES = ("melanin", "hemoglobin", "oxygenation", "eumelanin")
 CLASSES = ("very-light", "light", "intermediate", "tan", "brown", "dark")
 
@@ -87,14 +89,21 @@ def test_other_skins_can_be_fitted_too():
 
 def test_the_surface_is_added_where_the_data_have_it(exact):
     skin = lutgen.preset("dark")
-    assert pytest.approx(lutgen.reflectance(lutgen.layers(skin, 550)).specular, abs=1e-9) == fitting.SPECULAR
-    data = NM, of(exact, skin) + fitting.SPECULAR
+    assert pytest.approx(lutgen.reflectance(lutgen.layers(skin, 550)).specular, abs=1e-9) == SPECULAR
+    data = NM, of(exact, skin) + SPECULAR
     with_it, without = (lutgen.fit(data, specular_included=flag) for flag in (True, False))
     assert off(with_it, skin) < 1e-6
     assert off(without, skin) > 0.1
     assert np.abs(with_it.reflectance - data[1]).max() < 1e-7
     lab = ",".join(repr(float(v)) for v in color.lab(data[1] @ measured.color_weights(NM)))
     assert off(lutgen.fit("lab:" + lab, specular_included=True), skin) < 0.05  # 400 to 700 nm against all
+
+
+def test_the_refractive_index_is_that_of_the_base():
+    skin = lutgen.Skin(0.05, 0.7, 0.01, refractive_index=1.5)
+    data = NM, lutgen.spectrum(skin, NM) + 0.04
+    assert off(lutgen.fit(data, base=skin, specular_included=True), skin) < 1e-3
+    assert off(lutgen.fit(data, specular_included=True), skin) > 0.05
 
 
 def test_order_does_not_matter(exact):
@@ -107,7 +116,7 @@ def test_order_does_not_matter(exact):
 
 def misfit(exact, name: str, nm=NM) -> np.ndarray:
     """A preset's spectrum with the surface's reflection, off by a smooth 3 % as measured skin is from the model."""
-    return of(exact, lutgen.preset(name), nm) * (1 + 0.03 * np.sin((nm - 400) / 55)) + fitting.SPECULAR
+    return of(exact, lutgen.preset(name), nm) * (1 + 0.03 * np.sin((nm - 400) / 55)) + SPECULAR
 
 
 @pytest.mark.parametrize("name", CLASSES)
@@ -200,11 +209,11 @@ def test_covariance_is_that_of_a_straight_line():
         slope = np.column_stack([np.ones(count), np.linspace(-1, 1, count)])
         solution = np.linalg.pinv(slope)
         truth = 0.3**2 * np.linalg.inv(slope.T @ slope)
-        assert np.allclose(uncertainty.covariance(solution, slope, np.zeros(count), 0.3)[0], truth)
+        assert np.allclose(least_squares.covariance(solution, slope, np.zeros(count), 0.3)[0], truth)
         covariances = []
         for _ in range(400):
             data = rng.normal(0, 0.3, count)
-            values, alike = uncertainty.covariance(solution, slope, data - slope @ (solution @ data), None)
+            values, alike = least_squares.covariance(solution, slope, data - slope @ (solution @ data), None)
             covariances.append(values * (1 - alike) / (1 + alike))
         spread = np.std(covariances, axis=0) / np.sqrt(len(covariances))
         # Intercept against slope is a sum of `count` products that cancel: with one variance for all, what is left of

@@ -30,7 +30,7 @@ SKIN = Recipe().skin
 
 @pytest.fixture(scope="module")
 def exact():
-    return prediction.exact_totals(SKIN)
+    return exact_totals.exact_totals(SKIN)
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def test_drawn_noise_is_that_of_traces():
     found = []
     for seed in range(300, 300 + bakes):
         traced = path_table.trace(medium, *reach, stored_paths.edges(), photons, seed)
-        exactly = prediction.exact_totals(SKIN).grid(rule.wavelength_nm, traced.mu_epidermis, traced.mu_dermis)
+        exactly = exact_totals.exact_totals(SKIN).grid(rule.wavelength_nm, traced.mu_epidermis, traced.mu_dermis)
         own = verify._own(traced.anchored(exactly), expand.rgb_weights(rule.xyz_weights), model.skins, 0.7)
         found.append(profiles.encircled(own) @ stored_paths.within(stored_paths.edges(), model.radius_mm).T)
     drawn = model._unit_noise("6")[:, 0].std(axis=0) / np.sqrt(photons)
@@ -197,9 +197,9 @@ def test_oxygenation_that_varies_is_held_at_its_ends_and_costs_stored_paths(midd
     assert expanded.bytes["paths"] > 0
     assert expanded.recipe.skin.oxygenation == 0.5
     rule = expanded.recipe.wavelengths
-    worst = prediction.Colors(expanded.needs, prediction.exact_totals(SKIN)).quadrature(rule)
+    worst = prediction.Colors(expanded.needs, exact_totals.exact_totals(SKIN)).quadrature(rule)
     one = replace(expanded.needs, oxygenation=(0.5, 0.5))
-    assert worst > 1.5 * prediction.Colors(one, prediction.exact_totals(SKIN)).quadrature(rule)
+    assert worst > 1.5 * prediction.Colors(one, exact_totals.exact_totals(SKIN)).quadrature(rule)
 
 
 def test_bytes_are_those_of_the_baked_tables(expanded):

@@ -1,5 +1,7 @@
 """Chromophores and tissue against the reference table's own columns, and their allowed ranges."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from reference import TWO_LAYER
@@ -15,10 +17,8 @@ def test_coefficients_are_those_of_the_reference_table(row):
     nm, melanin, ratio, blood, oxygenation = (
         float(row[k]) for k in ("wavelength_nm", "f_mel", "f_eumel", "f_blood", "sO2")
     )
-    skin = lutgen.Skin(
-        0.02, 0.7, 0.01, reading=READINGS[row["reading"]]
-    )  # one row has no melanin: outside Skin's range
-    mu_s, g = tissue.scattering(skin, nm)
+    # One row has no melanin: outside Skin's range.
+    mu_s, g = tissue.scattering(tissue.Tissue(reading=READINGS[row["reading"]]), nm)
     mu_a = {"epi": chromophores.epidermis(nm, melanin, ratio), "der": chromophores.dermis(nm, blood, oxygenation)}
     for name, value in mu_a.items():
         # The table prints eight digits.
@@ -36,15 +36,39 @@ def test_layers_are_made_of_the_coefficients():
     assert epidermis.mu_s_per_mm == dermis.mu_s_per_mm == pytest.approx(36.910224, rel=1e-7)
 
 
+def test_a_skin_is_its_chromophores_and_its_tissue():
+    skin = lutgen.Skin(0.013, 0.4, 0.005, 0.6, 0.2, "saidi", "literal", 3.0, 5e10, 1.45)
+    assert skin.chromophores == tissue.Chromophores(0.013, 0.4, 0.005)
+    assert skin.tissue == tissue.Tissue(0.6, 0.2, "saidi", "literal", 3.0, 5e10, 1.45)
+    assert tissue.skin_of(skin.chromophores, skin.tissue) == skin
+    assert tissue.skin_of(lutgen.preset("dark").chromophores, skin.tissue) != skin
+    assert tuple(field.name for field in fields(tissue.Chromophores)) == chromophores.NAMES
+
+
+def test_files_hold_the_refractive_index_only_where_it_is_another():
+    keys = ["melanin", "eumelanin", "hemoglobin", "oxygenation", "epidermis_mm", "scattering", "reading",
+            "saidi_a_per_mm", "saidi_b_nm4_per_mm"]  # fmt: skip
+    assert list(tissue.plain(lutgen.preset("dark"))) == keys
+    other = tissue.plain(lutgen.Skin(0.02, 0.7, 0.01, refractive_index=1.45))
+    assert list(other) == [*keys, "refractive_index"]
+    assert lutgen.Skin(**other).refractive_index == 1.45
+
+
+def test_the_refractive_index_is_that_of_every_layer():
+    skin = lutgen.Skin(0.02, 0.7, 0.01, refractive_index=1.5)
+    assert [layer.n for layer in lutgen.layers(skin, 550)] == [1.5, 1.5]
+    assert lutgen.reflectance(lutgen.layers(skin, 550)).specular == pytest.approx(0.04, abs=1e-12)
+
+
 def test_source_law_is_twice_bashkatov():
     nm = np.linspace(380, 780, 41)
     assert np.allclose(chromophores.scattering_source(nm), 2 * chromophores.scattering_bashkatov(nm), rtol=1e-14)
 
 
 def test_saidi_keeps_both_fitted_values_as_parameters():
-    skin = lutgen.Skin(0.02, 0.7, 0.01, scattering="saidi", saidi_a_per_mm=3.0, saidi_b_nm4_per_mm=5e10)
+    neonate = tissue.Tissue(scattering="saidi", saidi_a_per_mm=3.0, saidi_b_nm4_per_mm=5e10)
     expected = 3.0 * (1 - 1.745e-3 * 500 + 9.843e-7 * 500**2) + 5e10 / 500**4
-    assert float(tissue.reduced_scattering(skin, 500.0)) == pytest.approx(expected, rel=1e-14)
+    assert float(tissue.reduced_scattering(neonate, 500.0)) == pytest.approx(expected, rel=1e-14)
 
 
 def test_donner_halves_the_dermis_and_no_path_table_takes_it():
@@ -76,7 +100,8 @@ def test_ranges_enclose_every_allowed_skin_and_are_reached():
 @pytest.mark.parametrize(
     ("field", "value"),
     [("melanin", 0.0), ("melanin", 0.6), ("eumelanin", -0.1), ("hemoglobin", 0.2), ("oxygenation", 1.1),
-     ("epidermis_mm", 0.0), ("melanin", float("nan")), ("scattering", "mie"), ("reading", "wrong")],
+     ("epidermis_mm", 0.0), ("refractive_index", 0.9), ("melanin", float("nan")), ("scattering", "mie"),
+     ("reading", "wrong")],
 )  # fmt: skip
 def test_skin_out_of_range_names_parameter_value_and_range(field, value):
     fields: dict = {"melanin": 0.02, "eumelanin": 0.7, "hemoglobin": 0.01} | {field: value}

@@ -8,18 +8,19 @@ import pytest
 import lutgen
 from lutgen import color
 from lutgen import device as ocl
+from lutgen.skin.tissue import Chromophores, Tissue, skin_of
 from lutgen.solvers import exact_totals, path_table, profiles
 from lutgen.tables import bake, expand, storage, wavelengths
 from lutgen.tables import recipe as recipes
 from lutgen.tables.axes import Axis, Grid, default_grid
 
-SKIN = recipes.Recipe().skin
+TISSUE = Tissue()
 SIGMAS = 4.5  # of the largest of 1,000 to 6,000 values
 
 
 def test_draft_holds_its_promise(draft):
     """Draft: at most 1.5 over 1,000 random skins against adding-doubling at 5 nm; the manifest says the same."""
-    exact = exact_totals.exact_totals(SKIN)
+    exact = exact_totals.exact_totals(TISSUE)
     found = bake.measure(draft, exact, seed=77)["color"]
     assert found["delta_e00_max"] < 1.5
     assert draft.manifest["error"]["color"]["delta_e00_max"] < 1.5
@@ -38,7 +39,7 @@ def test_color_nodes_are_exact_within_sigma(draft):
     """Every node against adding-doubling at the same wavelengths."""
     m, e, h = (v.ravel() for v in draft.color_lut.grid.nodes())
     nm = draft.paths.wavelength_nm
-    exact = exact_totals.exact_totals(SKIN)(nm, *expand.coefficients(nm, draft.absorbers, m, e, h)).T @ draft.weights
+    exact = exact_totals.exact_totals(TISSUE)(nm, *expand.coefficients(nm, draft.absorbers, m, e, h)).T @ draft.weights
     sigma = draft.color_std_error(m, e, h)
     assert np.all(np.abs(draft.color_lut.acescg.reshape(-1, 3) - exact) < SIGMAS * sigma + 5e-5)
 
@@ -47,7 +48,9 @@ def test_anchored_totals_are_exact_and_keep_the_shape(draft):
     anchored = lutgen.bake({"photons": 65_536, "seed": 5, "totals": "anchored"})
     m, e, h = (v.ravel() for v in anchored.color_lut.grid.nodes())
     nm = anchored.paths.wavelength_nm
-    exact = exact_totals.exact_totals(SKIN)(nm, *expand.coefficients(nm, anchored.absorbers, m, e, h)).T @ draft.weights
+    exact = (
+        exact_totals.exact_totals(TISSUE)(nm, *expand.coefficients(nm, anchored.absorbers, m, e, h)).T @ draft.weights
+    )
     assert np.abs(anchored.color_lut.acescg.reshape(-1, 3) - exact).max() < 5e-5
     one, two = (luts.profile(0.05, 0.7, 0.01).encircled() for luts in (draft, anchored))
     assert np.abs(one - two).max() < 0.01
@@ -57,7 +60,7 @@ def test_profiles_between_nodes_meet_a_converged_trace():
     """50 random skins, default set, against a trace of its own with another seed: EE difference at most 0.02."""
     luts = lutgen.load()
     rule = wavelengths.load("8")
-    medium, reach = bake.skin_medium(SKIN, rule.wavelength_nm)
+    medium, reach = bake.skin_medium(TISSUE, rule.wavelength_nm)
     truth = path_table.trace(medium, *reach, luts.paths.radius_edges_mm, 1_000_000, seed=99)
     skins = bake.random_skins(luts.profile_lut.grid, 50, 123)
     energy = np.einsum("kbp,kc->pcb", truth.evaluate(*expand.coefficients(
@@ -94,7 +97,7 @@ def test_extra_absorbers_are_baked_in(draft):
     more = draft.expand(extra_absorbers={"dermis": lambda w: 0.05 + 0.0 * w, "epidermis": 0.2})
     m, e, h = np.array([0.02]), np.array([0.7]), np.array([0.01])
     mu_e, mu_d = expand.coefficients(nm, draft.absorbers, m, e, h)
-    exact = exact_totals.exact_totals(SKIN)(nm, mu_e + 0.2, mu_d + 0.05).T @ draft.weights
+    exact = exact_totals.exact_totals(TISSUE)(nm, mu_e + 0.2, mu_d + 0.05).T @ draft.weights
     grid_error = np.abs(
         draft.color(m, e, h, "acescg") - draft.totals.evaluate(mu_e, mu_d)[:, 0].T @ draft.weights
     ).max()
@@ -113,7 +116,7 @@ def test_a_second_expansion_keeps_what_the_first_one_added(draft):
 
 
 def test_measured_error_sees_wrong_colors_and_shapes(draft):
-    exact = exact_totals.exact_totals(SKIN)
+    exact = exact_totals.exact_totals(TISSUE)
     pale = replace(draft, color_lut=replace(draft.color_lut, acescg=draft.color_lut.acescg * 1.1))
     assert bake.measure(pale, exact)["color"]["delta_e00_max"] > 1.5
     shifted = np.roll(draft.profile_lut.shape, 3, axis=-2)
@@ -196,11 +199,26 @@ def test_fixed_axes_and_other_settings_bake(tmp_path):
     fixed = Axis("eumelanin", "1", 0.7, 0.7, 1)
     grid = Grid(default_grid(4, 2, 3).melanin, fixed, default_grid(4, 2, 3).hemoglobin)
     recipe = replace(recipes.Recipe(), photons=4096, color=grid, profile=grid, pipeline="source", rings=32,
-                     skin=replace(SKIN, scattering="jacques", reading="similarity", epidermis_mm=0.06))  # fmt: skip
+                     skin=Tissue(epidermis_mm=0.06, scattering="jacques", reading="similarity", refractive_index=1.5),
+                     totals="anchored")  # fmt: skip
     luts = storage.load(storage.save(lutgen.bake(recipe), tmp_path / "set"))
     assert luts.color_lut.acescg.shape == (3, 1, 4, 3)
     assert luts.profile_lut.shape.shape == (3, 1, 4, 32, 3)
     assert recipes.from_dict(luts.manifest["recipe"]) == recipe
+    assert (luts.tissue, luts.manifest["trace"]["n"], round(luts.paths.entry, 9)) == (recipe.skin, 1.5, 0.96)
+    tone = Chromophores(*(float(axis.values[0]) for axis in grid.axes[::-1]))
+    skin = skin_of(tone, recipe.skin)
+    # Quadrature of 8 wavelengths errs by 2e-4; an index of 1.4 anywhere would make colors 4e-2 brighter.
+    node = luts.color(*luts.chromophores(skin))
+    assert np.abs(node - lutgen.linear_srgb(skin, pipeline="source")).max() < 1e-3
+    with pytest.raises(lutgen.InputError, match=r"refractive_index = 1.4: these LUTs hold 1.5"):
+        luts.chromophores(replace(skin, refractive_index=1.4))
+
+
+def test_of_a_skin_a_recipe_takes_the_tissue():
+    skin = lutgen.preset("dark")
+    assert recipes.Recipe(skin=skin) == recipes.Recipe()
+    assert "refractive_index" not in recipes.Recipe().as_dict()["skin"]
 
 
 def test_donner_scattering_is_refused_with_the_method_that_takes_it():

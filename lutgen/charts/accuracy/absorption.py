@@ -66,7 +66,7 @@ def white(name: str, nm: float, walk: str) -> tuple[path_table.Medium, str, floa
     if walk == "own nu":
         own = path_table.medium_of(layers(preset(name), nm), nm)
         return own, "", float(own.nu_per_mm[0])
-    bake, _ = skin_medium(preset(name), np.array([nm]))
+    bake, _ = skin_medium(preset(name).tissue, np.array([nm]))
     if walk == "bake nu":
         return bake, "", float(bake.nu_per_mm[0])
     return replace(bake, nu_per_mm=bake.nu_per_mm / CAP), _FIXED_LIFE, 0.0

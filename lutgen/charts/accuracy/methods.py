@@ -143,7 +143,7 @@ def factored(wavelengths: str, streams: int = adding_doubling.NODES) -> np.ndarr
     mu_d = chromophores.dermis(nm[:, None], GRID.hemoglobin.values, RECIPE.skin.oxygenation)
     scattering = tissue.scattering(RECIPE.skin, nm)
     R = adding_doubling.two_layer_grid(
-        RECIPE.skin.epidermis_mm, mu_e, mu_d, *scattering, tissue.REFRACTIVE_INDEX, nodes=streams
+        RECIPE.skin.epidermis_mm, mu_e, mu_d, *scattering, RECIPE.skin.refractive_index, nodes=streams
     )
     return np.einsum("ked,kc->dec", R, rule_weights(rule)).reshape(-1, 3)
 
@@ -157,7 +157,7 @@ def tabled(wavelengths: str) -> np.ndarray:
 def one_by_one(solve: Callable[[tissue.Skin, float], float], panel: Jury) -> np.ndarray:
     """Colors [N, 3] of a jury's nodes, each skin and each wavelength on its own."""
     rule = quadrature.load(WAVELENGTHS)
-    skins = [replace(RECIPE.skin, melanin=m, eumelanin=e, hemoglobin=h) for m, e, h in panel.chromophores.T]
+    skins = [tissue.skin_of(tissue.Chromophores(*values), RECIPE.skin) for values in panel.chromophores.T]
     R = np.array([[solve(skin, float(nm)) for nm in rule.wavelength_nm] for skin in skins])
     return R @ rule_weights(rule)
 
@@ -210,7 +210,7 @@ def runs(quick: bool, progress: Callable = lambda stage, tally: None) -> list[Ru
         found.append(_run(method, partial(one_by_one, solve, panel), panel))
     for absorption in direct.ABSORPTION:
         progress(f"direct, {absorption}", None)
-        direct.shares(tissue.layers(RECIPE.skin, 550.0), 512, absorption=absorption)
+        direct.shares(tissue.layers(tissue.preset("light"), 550.0), 512, absorption=absorption)
         for photons in (2**p for p in range(6, 12 if quick else 15, 2)):
             for seed in seeds:
                 count = iter(range(seed * 10**6, (seed + 1) * 10**6))  # no two nodes share their random numbers

@@ -85,7 +85,7 @@ def truth(photons: int, progress: Callable = lambda stage, tally: None) -> tuple
     """
     rule, since = wavelengths.load(TRUTH_RULE), time.perf_counter()
     skins = [PRESETS[tone] for tone in TONES]
-    medium, reach = bake.skin_medium(skins[0], rule.wavelength_nm)
+    medium, reach = bake.skin_medium(skins[0].tissue, rule.wavelength_nm)
     shares = (np.array([getattr(skin, name) for skin in skins]) for name in ("melanin", "eumelanin", "hemoglobin"))
     mu = expand.coefficients(rule.wavelength_nm, expand.absorbers(rule.wavelength_nm, 0.7), *shares)
     halves = []

@@ -23,7 +23,7 @@ from lutgen.tables import recipe as recipes
 from lutgen.tables import wavelengths as quadrature
 from lutgen.tables.axes import Grid, default_grid
 
-SKIN = recipes.Recipe().skin
+TISSUE = recipes.Recipe().skin
 """The setting of every chart here: the default recipe's."""
 *RULES, REFERENCE = _ALL = ("6", "8", "12", "10nm", "5nm")
 TRACE_WAVELENGTHS, TRACE_SEEDS, PHOTONS = 10, (0, 1), {False: 2**20, True: 2**17}
@@ -59,7 +59,7 @@ def grid(size: tuple[int, int, int], spacing: str, eumelanin: str) -> Grid:
 
 def exact_paths() -> PathTable:
     """The exact totals as a path table of one ring, at ten Chebyshev wavelengths."""
-    exact = exact_totals.exact_totals(SKIN)
+    exact = exact_totals.exact_totals(TISSUE)
     nu, ring = np.zeros(exact_totals.WAVELENGTHS), np.array([0, np.inf])
     mu_e, mu_d = (np.tile(root**3, (len(nu), 1)) for root in (exact.root_epidermis, exact.root_dermis))
     return PathTable(exact.wavelength_nm, nu, ring, mu_e, mu_d, exact.table[:, None], 0, 1.0)
@@ -67,7 +67,7 @@ def exact_paths() -> PathTable:
 
 def traced_paths(photons: int, seed: int) -> PathTable:
     """A trace at ten Chebyshev wavelengths, each covering the absorption of all from 380 to 780 nm."""
-    return bake.paths_at_every_wavelength(photons, _EDGES, seed, SKIN, wavelengths=TRACE_WAVELENGTHS)
+    return bake.paths_at_every_wavelength(photons, _EDGES, seed, TISSUE, count=TRACE_WAVELENGTHS)
 
 
 def at(paths: PathTable, rule: str) -> PathTable:
@@ -94,7 +94,7 @@ def _weights(rule: str) -> np.ndarray:
 
 
 def _absorbers(paths: PathTable) -> expand.Absorbers:
-    return expand.absorbers(paths.wavelength_nm, SKIN.oxygenation)
+    return expand.absorbers(paths.wavelength_nm, TISSUE.oxygenation)
 
 
 def _skins(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from lutgen import color
 from lutgen.charts import drawing
 from lutgen.charts.document.spectra import columns, nanometers, numbers, percent, shades, spectra, sweep, ticks
 from lutgen.charts.drawing import DASHES, GRAY, HUES, inches
-from lutgen.skin.tissue import LAWS, PRESETS, Skin, reduced_scattering
+from lutgen.skin.tissue import LAWS, PRESETS, Skin, Tissue, plain, reduced_scattering
 
 TYPES = ("Caucasian", "Asian", "African")
 DONNER_JENSEN = {"Caucasian": (0.005, 0.7, 0.005), "Asian": (0.15, 0.0, 0.01), "African": (0.5, 0.7, 0.05)}
@@ -50,7 +50,7 @@ def dress_spectra(axes) -> None:
 def law_curves(folder: Path) -> str:
     """Reduced scattering over wavelength, by law."""
     nm = nanometers()
-    curves = {law: reduced_scattering(Skin(0.01, 0.7, 0.01, scattering=law), nm) for law in LAWS[:-1]}
+    curves = {law: reduced_scattering(Tissue(scattering=law), nm) for law in LAWS[:-1]}
     with drawing.figure(
         8.4, 5.2, "Reduced scattering of skin, by law",
         "`source` is the document's, exactly twice `bashkatov`.\n"
@@ -97,7 +97,7 @@ def law_colors(folder: Path, steps: int) -> str:
                     axes.set_xlabel("melanin (volume fraction of the epidermis)" if i else "")
                 words = "reference" if law == "source" else f"{off[0]:.1f} to {off[-1]:.1f}"
                 axes.text(1.015, 0.5, words, transform=axes.transAxes, va="center", color=GRAY)
-                rows += [{**asdict(s), **numbers(r, ("default",)), "delta_e00_to_source": float(d)}
+                rows += [{**plain(s), **numbers(r, ("default",)), "delta_e00_to_source": float(d)}
                          for s, r, d in zip(ruled, found, off, strict=True)]  # fmt: skip
         drawing.save(drawn, folder, "scattering-colors", rows)
     return "ΔE00 to source at most " + ", ".join(f"{law} {d:.1f}" for law, d in worst.items() if law != "source")
@@ -132,7 +132,7 @@ def presets(folder: Path) -> str:
         axes.spines["bottom"].set_visible(False)
         dress_spectra(curves)
         drawing.label_ends(curves, 780, labels, 0.115)
-        rows = [{"preset": n, **asdict(PRESETS[n]), **numbers(r), **columns(r)} for n, r in found.items()]
+        rows = [{"preset": n, **plain(PRESETS[n]), **numbers(r), **columns(r)} for n, r in found.items()]
         drawing.save(drawn, folder, "presets", rows)
     return "L* " + ", ".join(f"{name} {lab[0]:.1f}" for name, (_, lab) in looks.items())
 
@@ -160,7 +160,7 @@ def published(folder: Path) -> str:
                 drawing.strip(inches(drawn, left, top, 1.35, 1.25), rgb[None])
                 words = f"{told(skin)}\nL* {lab[0]:.1f}" + (f"   ΔE00 {off[name, kind]:.1f}" if j else "")
                 drawn.text((left + 1.42) / 10.4, 1 - top / 7.6, words, va="top", size=8.5, linespacing=1.5)
-                rows.append({"skin": name, "parameters": kind, **asdict(skin), "delta_e00_to_document": off[name, kind],
+                rows.append({"skin": name, "parameters": kind, **plain(skin), "delta_e00_to_document": off[name, kind],
                              **numbers(found), "published": "", "status": "", "where": ""})  # fmt: skip
         notes = [f"{whose}, {status}: {where}" for whose, status, where in SOURCES]
         drawn.text(0.2 / 10.4, 1 - 6.0 / 7.6, "\n".join(textwrap.fill(n, 150, subsequent_indent="    ") for n in notes),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from lutgen.charts.document.spectra import (
     ticks,
 )
 from lutgen.charts.drawing import DASHES, GRAY, HUES, inches
-from lutgen.skin.tissue import PRESETS
+from lutgen.skin.tissue import PRESETS, plain
 
 STEPS = 24
 TYPES = comparisons.TYPES
@@ -99,7 +98,7 @@ def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
         off = {f"delta_e00_linear_to_exponential_{p}": apart[p] for p in PIPELINE_NAMES}
         off["delta_e00_between_pipelines_linear"] = between
         rows = [
-            {**asdict(skin), "absorption": a, **numbers(r), **{key: float(v[i]) for key, v in off.items()}}
+            {**plain(skin), "absorption": a, **numbers(r), **{key: float(v[i]) for key, v in off.items()}}
             for a in ABSORPTIONS
             for i, (skin, r) in enumerate(zip(skins, found[a], strict=True))
         ]
@@ -145,7 +144,7 @@ def skin_types(folder: Path) -> str:
         labels = [(float(found["linear"][i][-1]), TYPES[i], HUES[i]) for i in range(3)]
         drawing.label_ends(axes, 780, labels, 0.12)
         rows = [
-            {"skin": TYPES[i], **asdict(skins[i]), "absorption": a, **numbers(r), **columns(r)}
+            {"skin": TYPES[i], **plain(skins[i]), "absorption": a, **numbers(r), **columns(r)}
             for a in ABSORPTIONS for i, r in enumerate(found[a])
         ]  # fmt: skip
         drawing.save(drawn, folder, "skin-types", rows)

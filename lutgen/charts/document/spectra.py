@@ -7,15 +7,14 @@ medium that scatters with mu_s + mu_a (kernels/README.md, Three ways to absorb),
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from lutgen import color
 from lutgen.errors import one_of
 from lutgen.skin import chromophores
-from lutgen.skin.tissue import REFRACTIVE_INDEX, Skin, scattering
+from lutgen.skin.tissue import Skin, dermis_scattering, scattering
 from lutgen.solvers import adding_doubling, exact_totals
 
 ABSORPTIONS = ("linear", "exponential")
@@ -33,11 +32,6 @@ def nanometers() -> np.ndarray:
     return color.tables()["wavelength_nm"]
 
 
-@cache
-def _exact(skin: Skin) -> exact_totals.ExactTotals:
-    return exact_totals.exact_totals(skin)
-
-
 def spectra(skins: list[Skin], absorption: str = "linear") -> np.ndarray:
     """Exact diffuse reflectance [P, 81] of P skins with `linear` or with the document's `exponential` absorption."""
     of = _linear if one_of("absorption", absorption, ABSORPTIONS) == "linear" else _exponential
@@ -45,9 +39,9 @@ def spectra(skins: list[Skin], absorption: str = "linear") -> np.ndarray:
 
 
 def _linear(skin: Skin) -> np.ndarray:
-    table = _exact(replace(skin, melanin=0.01, eumelanin=0.7, hemoglobin=0.01, oxygenation=0.7))
-    shares = [skin.melanin], [skin.eumelanin], [skin.hemoglobin], [skin.oxygenation]
-    return exact_totals.spectra(table, nanometers(), *shares)[0]
+    exact = exact_totals.exact_totals(skin.tissue)
+    shares = [[value] for value in (*astuple(skin.chromophores), skin.oxygenation)]
+    return exact_totals.spectra(exact, nanometers(), *shares)[0]
 
 
 def _exponential(skin: Skin) -> np.ndarray:
@@ -55,9 +49,9 @@ def _exponential(skin: Skin) -> np.ndarray:
     mu_s, g = scattering(skin, nm)
     mu_e = chromophores.epidermis(nm, skin.melanin, skin.eumelanin)
     mu_d = chromophores.dermis(nm, skin.hemoglobin, skin.oxygenation)
-    below = (mu_s / 2 if skin.scattering == "donner" else mu_s) + mu_d
+    below = dermis_scattering(skin, mu_s) + mu_d
     return adding_doubling.two_layer_grid(
-        skin.epidermis_mm, mu_e[:, None], mu_d[:, None], mu_s + mu_e, g, REFRACTIVE_INDEX, below, nodes=_STREAMS
+        skin.epidermis_mm, mu_e[:, None], mu_d[:, None], mu_s + mu_e, g, skin.refractive_index, below, nodes=_STREAMS
     )[:, 0, 0]
 
 

@@ -150,9 +150,9 @@ def _tables(x: Axis, y: Axis, photons: int, seed: int) -> Iterator[ErrorMap]:
     truth, of = exact(stacks, TRUTH_NODES), "of the incident light"
     name = f"adding-doubling, {adding_doubling.NODES} nodes"
     yield _answered(name, f"1e-6 {of}", x, y, exact(stacks), truth, NODES_TOLERANCE)
-    found = exact_totals.exact_totals(MIDDLE)(nm, *mu)
+    found = exact_totals.exact_totals(MIDDLE.tissue)(nm, *mu)
     yield _answered("table of exact totals", f"1e-5 {of}", x, y, found, truth, TABLE_TOLERANCE)
-    medium, reach = bake.skin_medium(MIDDLE, nm)
+    medium, reach = bake.skin_medium(MIDDLE.tissue, nm)
     paths = path_table.trace(medium, *reach, np.array([0.0, 30.0]), photons, seed)
     found, sigma = paths.evaluate(*mu)[:, 0], paths.std_error(*mu)[:, 0]
     promise = f"{SIGMAS:g} σ ({photons:,} photons, one trace a column)"

@@ -15,7 +15,7 @@ import numpy as np
 import lutgen
 from lutgen import device as ocl
 from lutgen.charts.stability.kernel_values import WIDTHS, draws, evaluate, wide
-from lutgen.skin.tissue import Layer, Skin, layers, preset
+from lutgen.skin.tissue import Layer, Skin, Tissue, layers, preset
 from lutgen.solvers import adding_doubling, dipole, direct, path_table, paths, profiles
 from lutgen.tables import bake
 
@@ -95,7 +95,7 @@ def filled_sum() -> float:
 
 def step_budget() -> float:
     """Of a work-item at the wavelength of the longest paths, whose steps are counted in 32 bits."""
-    medium, _ = bake.skin_medium(preset("light"), np.array([780.0]))
+    medium, _ = bake.skin_medium(Tissue(), np.array([780.0]))
     worst = max(float(path_table._jobs(medium, 2048, 0, block)["max_steps"].max()) for block in (128, 2048))
     return worst / 2.0**32
 
@@ -110,7 +110,7 @@ def boundary_overshoot() -> float:
 
 def cells_that_differ() -> float:
     """No sum depends on the order of atomics, nor on how the blocks are split over launches."""
-    medium, reach = bake.skin_medium(preset("light"), np.array([450.0, 620.0]))
+    medium, reach = bake.skin_medium(Tissue(), np.array([450.0, 620.0]))
     edges = profiles.ring_edges()
     runs = [path_table.trace(medium, *reach, edges, 10_000, blocks_per_launch=size).energy for size in (None, None, 3)]
     return float(sum((run != runs[0]).sum() for run in runs))
@@ -180,7 +180,7 @@ def lanes_apart() -> float:
 
 def used_budget() -> float:
     """By the longest work-item of a trace at a wavelength of long paths."""
-    medium, _ = bake.skin_medium(preset("light"), np.array([640.0]))
+    medium, _ = bake.skin_medium(Tissue(), np.array([640.0]))
     device, used = ocl.choose(), 0.0
     for jobs, results, _, _ in path_table._launches(medium, 65_536, 0, device, None, path_table.Tally()):
         used = max(used, float((results["events"] / device.lanes / jobs["max_steps"]).max()))
