@@ -6,10 +6,11 @@ Names load on first use: `lutgen.load` and what it returns never import OpenCL.
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False  # what typing's is at run time, without 10 ms of imports before a command line is in charge
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from lutgen.errors import InputError, MachineError
     from lutgen.fitting import Fit, fit
     from lutgen.skin.tissue import PRESETS, Layer, Skin, layers, preset
@@ -54,6 +55,8 @@ def default_luts() -> Path:
     >>> default_luts().name
     'default'
     """
+    from pathlib import Path
+
     return Path(str(import_module("lutgen.luts").__file__)).parent / "default"
 
 

@@ -1,26 +1,38 @@
 # PYTHON_ARGCOMPLETE_OK
 """The command line: runs the command asked for, and is the only place that prints errors or exits.
 
-Only `sys` is imported before `main` is in charge, so that Ctrl-C is one line from the first instant.
+Ctrl-C is one line and status 130 from the first instant: next to nothing is imported before `main` is in charge.
 """
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+
+INTERRUPTED = "lutgen: interrupted; nothing was written"
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit status: 0, 2 for bad input, 1 where the machine fails, 130 at Ctrl-C."""
     try:
+        if arguments is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, _leave)
         return _run(sys.argv[1:] if arguments is None else arguments)
     except KeyboardInterrupt:
-        return _fail("interrupted; nothing was written", 130)
+        print(INTERRUPTED, file=sys.stderr)
+        return 130
+
+
+def _leave(number, frame) -> None:
+    """End at once, which is right while modules are imported: some swallow an exception or make another of it."""
+    os.write(2, f"{INTERRUPTED}\n".encode())
+    os._exit(130)
 
 
 def _run(arguments: list[str]) -> int:
     import io
     import json
-    import os
 
     from lutgen import errors
 
@@ -35,6 +47,8 @@ def _run(arguments: list[str]) -> int:
 
             argcomplete.autocomplete(parser(asked(os.environ["COMP_LINE"].split())))
         options = parser(asked(arguments)).parse_args(arguments)
+        if signal.getsignal(signal.SIGINT) is _leave:
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # a command cleans up behind itself
         result, text, status = options.run(options)
         print(json.dumps(result) if options.json else text, flush=True)
         return status
