@@ -72,8 +72,8 @@ def _halves(stage: Stage, look: Look, camera: looks.Camera, added: Iterable[int]
     width, height = (n * SAMPLES for n in stage.size)
     halves = [(0, width)] if look.split == "none" else [(0, width // 2), (width // 2, width)]
     for k, (left, right) in enumerate(halves):
-        for one in added:
-            _scatter(stage, look, camera, look.split if k else "none", (left, 0, right - left, height), one)
+        for frame in added:
+            _scatter(stage, look, camera, look.split if k else "none", (left, 0, right - left, height), frame)
 
 
 def _light_clip(stage: Stage, look: Look) -> np.ndarray:
@@ -154,8 +154,8 @@ def draw_surface(
 def _scatter(
     stage: Stage, look: Look, camera: looks.Camera, split: str, scissor: tuple[int, int, int, int], frame: int
 ) -> None:
-    one, targets, buffer = side(stage, split), stage.targets, stage.targets["scattered_buffer"]
-    program, tables = one.gather.program, one.textures
+    shown, targets, buffer = side(stage, split), stage.targets, stage.targets["scattered_buffer"]
+    program, tables = shown.gather.program, shown.textures
     context = gl.context()
     context.enable_only(moderngl.BLEND if frame else moderngl.NOTHING)
     context.blend_func = moderngl.ONE, moderngl.ONE
@@ -167,7 +167,7 @@ def _scatter(
     gl.put(program, focal=camera.focal_pixels * SAMPLES, center=tuple(n * SAMPLES / 2 for n in stage.size),
            taps=0 if split == "scattering" else TAPS[look.tier], sun=tuple(look.light * lighting.SUN / np.pi),
            frame=frame)  # fmt: skip
-    one.gather.array.render()
+    shown.gather.array.render()
     buffer.scissor = None
 
 

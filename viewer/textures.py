@@ -21,6 +21,7 @@ from . import gl
 TAIL = Axis("tail", "1", 0.0, 1.0, 64, "power:0.5")
 """Share of the widest channel's light beyond a ring, where radii are tabled: denser toward 0, the tail."""
 LEAST_TAIL = 0.0005
+"""Of the last radius: all light is within none that is finite."""
 RADIUS_MM = Axis("radius_mm", "mm", 0.005, 20.0, 64, "log")
 """Radii at which encircled energy is tabled."""
 
@@ -65,14 +66,13 @@ def _profile_tables(shape: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, n
     P = np.moveaxis(profiles.encircled(np.moveaxis(flat, 1, -1)), 1, -1)
     shared = _weights(edges, RADIUS_MM.values) @ P  # all nodes have the same edges: one product
     within = np.concatenate([shared, np.broadcast_to(r99, (*shared.shape[:2], 1))], axis=-1)
-    rings, within = (_sliced(table.reshape(*shape.shape[:3], *table.shape[1:])) for table in (rings, within))
-    return rings, within
+    return _sliced(rings, shape.shape[:3]), _sliced(within, shape.shape[:3])
 
 
-def _sliced(table: np.ndarray) -> np.ndarray:
-    """[N_h, N_e, N_m, Q, 4] as [N_e N_h, N_m, Q, 4]."""
-    h, e, m, q, c = table.shape
-    return table.transpose(1, 0, 2, 3, 4).reshape(e * h, m, q, c)
+def _sliced(table: np.ndarray, grid: tuple[int, ...]) -> np.ndarray:
+    """Rows of nodes [N_h N_e N_m, Q, 4] as [N_e N_h, N_m, Q, 4]."""
+    N_h, N_e, N_m = grid
+    return table.reshape(N_h, N_e, N_m, -1, 4).transpose(1, 0, 2, 3, 4).reshape(N_e * N_h, N_m, -1, 4)
 
 
 def _weights(edges: np.ndarray, radii: np.ndarray) -> np.ndarray:

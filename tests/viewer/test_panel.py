@@ -38,10 +38,10 @@ def stage(other):
     """A square meter facing the camera."""
     corners = np.array([[-500, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]], "f4")
     square = Mesh(corners, np.tile(np.array([0, 0, 1], "f4"), (4, 1)), None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
-    made = app.open_stage(lutgen.load(), square, Maps(), SIZE, other)
-    app.picture(made, FACING)
-    yield made
-    stages.release(made)
+    opened = app.open_stage(lutgen.load(), square, Maps(), SIZE, other)
+    app.picture(opened, FACING)
+    yield opened
+    stages.release(opened)
 
 
 class Hand:
@@ -84,9 +84,9 @@ class Hand:
 
 @pytest.fixture
 def hand(stage):
-    made = Hand(stage, FACING)
-    yield made
-    made.close()
+    mouse = Hand(stage, FACING)
+    yield mouse
+    mouse.close()
 
 
 @pytest.mark.parametrize("name", [name for name, _ in panel.SLIDERS if name])
@@ -168,15 +168,15 @@ def test_preset_buttons_set_the_skin(hand, monkeypatch):
 def test_what_is_picked_is_the_skin_there(stage):
     """Its spectrum against adding-doubling within the table's own noise, its profile and color those of the set."""
     app.picture(stage, FACING)
-    found = picking.pick(stage, FACING, 40, 50)
-    assert (found.melanin, found.eumelanin, found.hemoglobin) == pytest.approx((0.03, 0.7, 0.01), rel=1e-6)
+    picked = picking.pick(stage, FACING, 40, 50)
+    assert (picked.melanin, picked.eumelanin, picked.hemoglobin) == pytest.approx((0.03, 0.7, 0.01), rel=1e-6)
     luts = lutgen.load()
     skin = Skin(0.03, 0.7, 0.01)
-    exact = lutgen.spectrum(skin, found.wavelength_nm)
-    assert found.reflectance == pytest.approx(exact, abs=4e-3)
-    assert found.linear_srgb == pytest.approx(luts.color(0.03, 0.7, 0.01), rel=1e-5)
-    assert found.profile.energy == pytest.approx(luts.profile(0.03, 0.7, 0.01).energy, rel=1e-5)
-    assert found.thickness_mm == 32
+    exact = lutgen.spectrum(skin, picked.wavelength_nm)
+    assert picked.reflectance == pytest.approx(exact, abs=4e-3)
+    assert picked.linear_srgb == pytest.approx(luts.color(0.03, 0.7, 0.01), rel=1e-5)
+    assert picked.profile.energy == pytest.approx(luts.profile(0.03, 0.7, 0.01).energy, rel=1e-5)
+    assert picked.thickness_mm == 32
     assert picking.pick(stage, FACING, -1, 50) is None
     assert picking.pick(stage, FACING, 40, SIZE[1]) is None
 
@@ -188,23 +188,23 @@ def test_picking_knows_where_the_picture_is(stage):
     corners = np.array([[-500, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]], "f4")
     uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], "f4")
     square = Mesh(corners, np.tile(np.array([0, 0, 1], "f4"), (4, 1)), uv, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
-    made = app.open_stage(lutgen.load(), square, Maps(chromophores=ratios), SIZE)
+    opened = app.open_stage(lutgen.load(), square, Maps(chromophores=ratios), SIZE)
     look = replace(FACING, distance_mm=3000, melanin=0.02)
-    app.picture(made, look)
-    upper, lower = (picking.pick(made, look, 48, y) for y in (15, 80))
+    app.picture(opened, look)
+    upper, lower = (picking.pick(opened, look, 48, y) for y in (15, 80))
     assert upper.melanin > lower.melanin == pytest.approx(0.02, rel=1e-3)
     far = replace(look, distance_mm=5000)
-    app.picture(made, far)
-    assert picking.pick(made, far, 2, 2) is None
-    stages.release(made)
+    app.picture(opened, far)
+    assert picking.pick(opened, far, 2, 2) is None
+    stages.release(opened)
 
 
 def test_pick_and_picture_follow_the_oxygenation(stage):
     blue = replace(FACING, oxygenation=0.1)
     app.picture(stage, blue)
-    found = picking.pick(stage, blue, 48, 48)
+    picked = picking.pick(stage, blue, 48, 48)
     expected = lutgen.load().expand(oxygenation=0.1).color(0.03, 0.7, 0.01)
-    assert found.linear_srgb == pytest.approx(expected, rel=1e-5)
+    assert picked.linear_srgb == pytest.approx(expected, rel=1e-5)
     app.picture(stage, FACING)
 
 

@@ -23,9 +23,9 @@ def plane():
     corners = np.array([[-500, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]], "f4")
     normals = np.tile(np.array([0, 0, 1], "f4"), (4, 1))
     square = Mesh(corners, normals, None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
-    made = app.open_stage(lutgen.load(), square, Maps(), (160, 160))
-    yield made
-    stages.release(made)
+    stage = app.open_stage(lutgen.load(), square, Maps(), (160, 160))
+    yield stage
+    stages.release(stage)
     gl.check()
 
 
@@ -53,13 +53,13 @@ def test_relief_adds_no_light(plane, angle, distance):
 
 def test_without_bumps_the_normal_is_the_mesh_s(plane):
     values = {"light_azimuth": 20, "light_elevation": 10, "distance_mm": 80, "bumps": 0}
-    found = layer(plane, "reflected", **values)
+    reflected = layer(plane, "reflected", **values)
     kept = plane.maps["pores"]
     plane.maps["pores"] = gl.image(np.array([[[0.0, 0.0, 0.0, 1.0]]], "f4"))
     flat = layer(plane, "reflected", **values)
     plane.maps["pores"].release()
     plane.maps["pores"] = kept
-    assert np.array_equal(found, flat)
+    assert np.array_equal(reflected, flat)
 
 
 def test_pores_break_up_the_highlight_near_and_widen_it_far(plane):
@@ -83,29 +83,29 @@ def rougher(pairs: np.ndarray) -> np.ndarray:
     program = context.program(vertex_shader=gl.splice("screen.vert.glsl"), fragment_shader=source)
     corners = context.buffer(np.array([-1, -1, 3, -1, -1, 3], "f4").tobytes())
     array = context.vertex_array(program, [(corners, "2f", "corner")])
-    given, out = (
+    inputs, out = (
         gl.texture((len(pairs), 1), 2, "f4", pairs.astype("f4").tobytes()),
         gl.texture((len(pairs), 1), 4, "f4"),
     )
     target = context.framebuffer([out])
-    gl.bind(program, pairs=given)
+    gl.bind(program, pairs=inputs)
     target.use()
     array.render()
-    found = gl.read(target)[0, :, 0].astype(float)
-    gl.free(program, corners, array, given, out, target)
+    roughness = gl.read(target)[0, :, 0].astype(float)
+    gl.free(program, corners, array, inputs, out, target)
     gl.check()
-    return found
+    return roughness
 
 
 def test_roughness_grows_with_the_slopes_that_became_invisible():
     variance = np.linspace(0, 0.5, 26)
     for roughness in (0.2, 0.5, 0.9):
-        found = rougher(np.stack([np.full_like(variance, roughness), variance], axis=1))
-        assert found[0] == pytest.approx(roughness, abs=1e-5)
-        assert np.all(np.diff(found) >= 0)
-        below = found < 1
-        assert found[below] ** 4 == pytest.approx(roughness**4 + variance[below], abs=1e-5)
-    assert found.max() == 1
+        rough = rougher(np.stack([np.full_like(variance, roughness), variance], axis=1))
+        assert rough[0] == pytest.approx(roughness, abs=1e-5)
+        assert np.all(np.diff(rough) >= 0)
+        below = rough < 1
+        assert rough[below] ** 4 == pytest.approx(roughness**4 + variance[below], abs=1e-5)
+    assert rough.max() == 1
 
 
 def test_no_black_outlines_and_no_lost_light():
@@ -132,17 +132,17 @@ def test_the_detail_of_a_painted_albedo_is_a_ratio_of_colors():
     albedo = np.full((8, 8, 3), 0.4)
     albedo[0, 0] = 0.2
     albedo[0, 1] = 0.5, 0.2, 0.2
-    found = subject.detail(albedo)
-    assert found[0, 0] == pytest.approx([0.5, 0.5, 0.5], abs=1e-6)
-    assert color.from_acescg(found[0, 1] * 0.4, "srgb") == pytest.approx([0.5, 0.2, 0.2], abs=1e-6)
+    detail = subject.detail(albedo)
+    assert detail[0, 0] == pytest.approx([0.5, 0.5, 0.5], abs=1e-6)
+    assert color.from_acescg(detail[0, 1] * 0.4, "srgb") == pytest.approx([0.5, 0.2, 0.2], abs=1e-6)
 
 
 def test_the_tile_repeats_every_so_many_millimetres(plane):
     """The same place one tile farther is lit alike: lengths are millimetres on any mesh."""
     values = {"light_azimuth": 50, "light_elevation": 0, "distance_mm": 200}
-    one = layer(plane, "entering", **values)
-    two = layer(plane, "entering", **(values | {"target_mm": (pores.SIDE_MM, 0, 0)}))
-    assert np.abs(one[..., 0] - two[..., 0]).max() < 0.02 * one[..., 0].mean()
+    first = layer(plane, "entering", **values)
+    second = layer(plane, "entering", **(values | {"target_mm": (pores.SIDE_MM, 0, 0)}))
+    assert np.abs(first[..., 0] - second[..., 0]).max() < 0.02 * first[..., 0].mean()
 
 
 @pytest.mark.parametrize(("blocked", "least", "most"), [(False, 0.5, 1.0), (True, 0.0, 0.01)])

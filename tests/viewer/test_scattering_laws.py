@@ -15,9 +15,9 @@ TONES, SIDE = laws.TONES, laws.SIDE
 
 @pytest.fixture(scope="module")
 def plane():
-    made = laws.open_plane(lutgen.load())
-    yield made
-    laws.release(made)
+    opened = laws.open_plane(lutgen.load())
+    yield opened
+    laws.release(opened)
 
 
 @pytest.mark.parametrize(
@@ -41,12 +41,12 @@ def test_the_truth_is_the_profile_around_a_point(plane):
         profile = plane.luts.profile(*laws.chromophores(tone))
         radii = np.arange(30, 120)
         image = laws.blurred_disc(plane, tone, 0.05, radius=2.0) / (4 * np.pi)
-        found = laws.encircled(image, SIDE / 2, SIDE / 2, radii)
+        shares = laws.encircled(image, SIDE / 2, SIDE / 2, radii)
         exact = np.cumsum(profile.energy, axis=0) / profile.energy.sum(axis=0)
         expected = np.stack(
             [np.interp(0.05 * radii, profile.radius_edges_mm[1:], exact[:, c]) for c in range(3)], axis=1
         )
-        assert np.abs(found - expected).max() < 0.003
+        assert np.abs(shares - expected).max() < 0.003
         wide = laws.blurred_disc(plane, tone, 0.5, radius=60.0)
         assert wide[SIDE // 2, SIDE // 2] == pytest.approx(1, abs=0.002)
         across = laws.blurred_edge(plane, tone, 0.2)
@@ -82,10 +82,10 @@ def fetched(plane, skins):
     gl.bind(program, lut_color=uploaded.color, skins=values)
     target.use()
     array.render()
-    found = gl.read(target)[..., :3].reshape(-1, 3)
+    colors = gl.read(target)[..., :3].reshape(-1, 3)
     gl.free(program, corners, array, values, out, target)
     gl.check()
-    return found
+    return colors
 
 
 def test_a_shader_fetches_what_numpy_interpolates(plane):
@@ -147,7 +147,7 @@ def test_no_taps_where_they_would_not_show(plane, forced):
         assert laws.scattered(plane, light, skin, scale, 64) / color == pytest.approx(light, abs=1e-5)
         change, scale = worst_change(plane, forced, tone, 0.5, 64)
         assert change > 1 / 255
-        full, kept = (laws.scattered(one, light, skin, scale, 64) for one in (forced, plane))
+        full, kept = (laws.scattered(gathering, light, skin, scale, 64) for gathering in (forced, plane))
         assert np.array_equal(full, kept)  # above the limit nothing is left out
 
 
@@ -174,9 +174,9 @@ def test_what_another_skin_scatters_changes_only_there(plane):
     square = np.zeros((SIDE, SIDE), bool)
     square[100:150, 110:160] = True
     changed[square, 2] = 0.05
-    one, two = (laws.scattered(plane, light, skins, 0.2, 16) for skins in (plain, changed))
-    assert np.array_equal(one[~square], two[~square])
-    ratio = two[square] / one[square]
+    before, after = (laws.scattered(plane, light, skins, 0.2, 16) for skins in (plain, changed))
+    assert np.array_equal(before[~square], after[~square])
+    ratio = after[square] / before[square]
     assert ratio[:, 1].max() < 0.9
     color = plane.luts.color(*changed[120, 130], space="acescg") / plane.luts.color(*plain[120, 130], space="acescg")
     assert np.abs(ratio / color - 1).max() > 0.01  # not the color alone: the profile too

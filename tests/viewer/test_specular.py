@@ -55,9 +55,9 @@ def test_the_table_of_the_lobes_energy_is_right_between_its_nodes():
     cosines = np.concatenate([np.linspace(0.1, 1, 16), np.maximum(rng.random(60) ** 2, 1e-3)])
     for roughness in lobes:
         exact = lighting._lobe(cosines, roughness, 192, 48)
-        found = between_nodes(table, cosines, roughness)
-        assert 0.9965 < (exact / found)[:, 0].min() <= (exact / found)[:, 0].max() < 1.0011
-        assert np.abs(exact - found)[:, 1].max() < 0.002
+        tabled = between_nodes(table, cosines, roughness)
+        assert 0.9965 < (exact / tabled)[:, 0].min() <= (exact / tabled)[:, 0].max() < 1.0011
+        assert np.abs(exact - tabled)[:, 1].max() < 0.002
 
 
 def test_a_smooth_lobe_and_a_rough_one_have_the_albedos_of_their_limits():
@@ -168,7 +168,7 @@ def test_a_rough_mirror_shows_what_its_facets_do(mirror, picture):
         for cosine in (0.1, 0.3, 0.6, 0.95):
             views = cosine * normals + np.sqrt(1 - cosine**2) * level
             exact = lobe_mean(normals, views, cosine, roughness)
-            found = mirror(normals, views, roughness, picture)
-            errors.append(np.sqrt(((found - exact) ** 2).mean()) / exact.mean())
+            mirrored = mirror(normals, views, roughness, picture)
+            errors.append(np.sqrt(((mirrored - exact) ** 2).mean()) / exact.mean())
     assert np.mean(errors) < 0.16
     assert max(errors) < 0.40

@@ -24,9 +24,9 @@ PASSES = ["shadow", "surface", "scattering", "composition"]
 
 @pytest.fixture(scope="module")
 def stage():
-    made = app.open_stage(lutgen.load(), builtin.builtin(), Maps(), (160, 90))
-    yield made
-    stages.release(made)
+    opened = app.open_stage(lutgen.load(), builtin.builtin(), Maps(), (160, 90))
+    yield opened
+    stages.release(opened)
 
 
 def test_passes_are_timed_and_add_up_to_the_frame(stage):
@@ -71,15 +71,15 @@ def test_what_takes_longer_is_told_to_take_longer(stage):
 
 @pytest.mark.parametrize("software", [True, False])
 def test_a_clock_forgets_the_last_frame(software):
-    one = clock.open_clock(software)
+    timer = clock.open_clock(software)
     for name in PASSES[:2]:
-        clock.start(one)
-        with clock.timed(one, name):
+        clock.start(timer)
+        with clock.timed(timer, name):
             time.sleep(0.005)
-        assert list(clock.milliseconds(one)) == [name]
-        assert 5 <= clock.milliseconds(one)[name] < 1000 or not software
-    clock.release(one)
-    assert not clock.milliseconds(one)
+        assert list(clock.milliseconds(timer)) == [name]
+        assert 5 <= clock.milliseconds(timer)[name] < 1000 or not software
+    clock.release(timer)
+    assert not clock.milliseconds(timer)
     gl.check()
 
 
@@ -87,13 +87,13 @@ def test_queries_are_handed_on():
     """moderngl never deletes a query: the next clock must take those of the one before."""
     held = []
     for _ in range(3):
-        one = clock.open_clock(software=False)
+        timer = clock.open_clock(software=False)
         for name in PASSES:
-            with clock.timed(one, name):
+            with clock.timed(timer, name):
                 pass
-        held.append({id(query) for query in one.queries.values()})
+        held.append({id(query) for query in timer.queries.values()})
         assert len(held[-1]) == len(PASSES)
-        clock.release(one)
+        clock.release(timer)
     assert held[0] == held[1] == held[2]
 
 
@@ -101,9 +101,9 @@ def test_queries_are_handed_on():
 def painted():
     """The built-in head with its maps: freckles, blotches, thin ears."""
     shape = builtin.builtin()
-    made = app.open_stage(lutgen.load(), shape, Maps(**paint.paint(shape)), (160, 160))
-    yield made
-    stages.release(made)
+    stage = app.open_stage(lutgen.load(), shape, Maps(**paint.paint(shape)), (160, 160))
+    yield stage
+    stages.release(stage)
 
 
 @pytest.mark.parametrize("preset", ["light", "tan", "dark"])
@@ -117,11 +117,11 @@ def test_a_plain_head_is_the_same_picture_without_scattering(painted, preset):
     game = plain.open_plain(painted, look)
     plain.draw(painted, game, look)
     assert list(painted.milliseconds) == ["shadow", "surface", "composition"]
-    found = passes.pixels(painted).astype(int)
+    drawn = passes.pixels(painted).astype(int)
     plain.release(game)
     expected = app.picture(painted, look).astype(int)
-    assert np.abs(found - expected).mean() < 0.5
-    assert np.percentile(np.abs(found - expected), 95) <= 2
+    assert np.abs(drawn - expected).mean() < 0.5
+    assert np.percentile(np.abs(drawn - expected), 95) <= 2
     other = app.picture(painted, replace(look, melanin=1.2 * look.melanin)).astype(int)
     assert np.abs(other - expected).mean() > 0.5
 

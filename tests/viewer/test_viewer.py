@@ -33,9 +33,9 @@ FOURFOLD = np.full((2, 2, 3), [4.0, 1.0, 1.0], "f4")
 @pytest.fixture(scope="module")
 def stage():
     shape = builtin.builtin()
-    made = app.open_stage(lutgen.load(), shape, Maps(**paint.paint(shape)), SIZE)
-    yield made
-    stages.release(made)
+    opened = app.open_stage(lutgen.load(), shape, Maps(**paint.paint(shape)), SIZE)
+    yield opened
+    stages.release(opened)
     gl.check()
 
 
@@ -45,9 +45,9 @@ def plain():
     corners = np.array([[-500, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]], "f4")
     normals = np.tile(np.array([0, 0, 1], "f4"), (4, 1))
     square = Mesh(corners, normals, None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
-    made = app.open_stage(lutgen.load(), square, Maps(), SIZE)
-    yield made
-    stages.release(made)
+    opened = app.open_stage(lutgen.load(), square, Maps(), SIZE)
+    yield opened
+    stages.release(opened)
 
 
 @contextmanager
@@ -105,9 +105,9 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(plain, tier):
     """Without the entry factor a directional light of irradiance pi along the normal gives the LUT's own color."""
     look = Look(entry=0, environment=0, light=np.pi, light_azimuth=0, light_elevation=0, azimuth=0, elevation=0,
                 distance_mm=300, tier=tier, transmission=0)  # fmt: skip
-    found = linear(plain, look)[140:180, 140:180]
+    radiance = linear(plain, look)[140:180, 140:180]
     expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
-    assert np.abs(found / expected - 1).max() < 0.005
+    assert np.abs(radiance / expected - 1).max() < 0.005
 
 
 def test_where_the_sky_is_hidden_light_comes_from_skin(plain):
@@ -130,11 +130,11 @@ def test_an_exr_holds_the_radiance_behind_the_picture(plain, stage, tmp_path):
     look = Look(entry=0, environment=0, light=np.pi, light_azimuth=0, light_elevation=0, azimuth=0, elevation=0,
                 distance_mm=300, exposure=3, transmission=0, specular=0, tier="reference")  # fmt: skip
     app.screenshot(plain, look, tmp_path / "plane.EXR")
-    found = exr.read(tmp_path / "plane.EXR")["view"]
+    view = exr.read(tmp_path / "plane.EXR")["view"]
     expected = lutgen.load().color(look.melanin, look.eumelanin, look.hemoglobin, space="acescg") * lighting.SUN
-    assert np.abs(found.stack("RGB")[70:90, 70:90] / expected - 1).max() < 0.005
-    assert np.all(found.channels["mask"] == 1)
-    assert found.attributes["look"]["exposure"] == 3
+    assert np.abs(view.stack("RGB")[70:90, 70:90] / expected - 1).max() < 0.005
+    assert np.all(view.channels["mask"] == 1)
+    assert view.attributes["look"]["exposure"] == 3
     app.screenshot(stage, LOOK, tmp_path / "face.exr")
     face = exr.read(tmp_path / "face.exr")["view"]
     skin, shown = face.channels["mask"], app.picture(stage, LOOK) @ np.array([0.2126, 0.7152, 0.0722])
@@ -209,12 +209,12 @@ def test_nothing_is_left_on_the_gpu():
     shape, luts = builtin.builtin(), lutgen.load()
     before = gl_objects.alive()
     for _ in range(2):
-        made = app.open_stage(luts, shape, Maps(), (32, 32))
-        app.picture(made, Look(split="burley"))
-        stages.resize(made, (48, 16))
-        assert app.picture(made, Look()).shape == (16, 48, 3)
+        stage = app.open_stage(luts, shape, Maps(), (32, 32))
+        app.picture(stage, Look(split="burley"))
+        stages.resize(stage, (48, 16))
+        assert app.picture(stage, Look()).shape == (16, 48, 3)
         assert {kind for kind, _ in gl_objects.alive() - before} >= {*gl_objects.KINDS} - {"Query"}
-        stages.release(made)
+        stages.release(stage)
         assert gl_objects.alive() - before == set()
 
 
@@ -235,10 +235,10 @@ def test_a_lost_object_is_seen(kind):
     name = getattr(thing, "glo", 0)
     del thing
     lost = gl_objects.orphans() - before
-    assert {one for one, _ in lost} == {kind}
-    for one, number in lost:
+    assert {lost_kind for lost_kind, _ in lost} == {kind}
+    for lost_kind, number in lost:
         assert name in (0, number)
-        gl_objects.delete(one, number)
+        gl_objects.delete(lost_kind, number)
     gl.free(*kept)
 
 
@@ -323,30 +323,30 @@ def test_generated_maps_lie_under_the_meshs_own_and_these_under_a_folders(tmp_pa
     monkeypatch.setattr(
         subject.mesh, "of", lambda *given: replace(square, textures=textures_given, notes=(str(given),))
     )
-    shape, found = subject.model("a.glb", 2.0, None, True)
+    shape, maps = subject.model("a.glb", 2.0, None, True)
     assert shape.notes == ("('a.glb', 2.0, True)", "painted")
     assert np.array_equal(shape.positions_mm, np.eye(4, 3) - [1, 2, 3])
-    assert found.albedo is None
-    assert found.chromophores is not None
-    assert found.chromophores[0, 0, 0] == 2
+    assert maps.albedo is None
+    assert maps.chromophores is not None
+    assert maps.chromophores[0, 0, 0] == 2
     textures_given |= {"albedo": np.full((1, 1, 3), 188, "u1"), "normal": pixel + 1}
-    _, found = subject.model("a.glb", None, None)
-    assert found.chromophores is None  # it is in the albedo already
-    assert found.albedo is not None
-    assert found.normal is not None
-    assert found.albedo[0, 0, 0] == pytest.approx(0.503, abs=1e-3)
-    assert found.normal[0, 0, 0] == 10
-    assert np.all(found.surface == 0.5)
+    _, maps = subject.model("a.glb", None, None)
+    assert maps.chromophores is None  # it is in the albedo already
+    assert maps.albedo is not None
+    assert maps.normal is not None
+    assert maps.albedo[0, 0, 0] == pytest.approx(0.503, abs=1e-3)
+    assert maps.normal[0, 0, 0] == 10
+    assert np.all(maps.surface == 0.5)
     Image.fromarray(np.full((1, 1), 255, "u1")).save(tmp_path / "occlusion.png")
     Image.new("RGB", (1, 1), (128, 128, 255)).save(tmp_path / "normal.png")
-    _, found = subject.model("a.glb", None, str(tmp_path))
-    assert found.surface is not None
-    assert found.normal is not None
-    assert found.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
-    assert found.normal[0, 0, 2] == 1
-    assert found.albedo is not None
-    _, found = subject.model("a.glb", None, subject.NO_MAPS)
-    assert found == Maps()
+    _, maps = subject.model("a.glb", None, str(tmp_path))
+    assert maps.surface is not None
+    assert maps.normal is not None
+    assert maps.surface[0, 0].tolist() == [0.5, 0.5, 1.0, 0.5]
+    assert maps.normal[0, 0, 2] == 1
+    assert maps.albedo is not None
+    _, maps = subject.model("a.glb", None, subject.NO_MAPS)
+    assert maps == Maps()
 
 
 def test_a_head_without_texture_coordinates_is_drawn_and_said(tmp_path, capsys):

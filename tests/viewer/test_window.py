@@ -150,12 +150,12 @@ SET = [text for name, value in LOOK.items() for text in ("--set", f"{name}={valu
 @pytest.fixture(scope="module")
 def screen(tmp_path_factory):
     folder = tmp_path_factory.mktemp("screen")
-    made = Screen(folder, ["view", "--size", f"{WIDTH}x{HEIGHT}", "--json", *SET])
+    opened = Screen(folder, ["view", "--size", f"{WIDTH}x{HEIGHT}", "--json", *SET])
     try:
-        yield made
-        assert made.close() == 0  # any OpenGL error pending would have ended it with 1
+        yield opened
+        assert opened.close() == 0  # any OpenGL error pending would have ended it with 1
     finally:
-        made.kill()
+        opened.kill()
 
 
 def middle(picture: np.ndarray) -> np.ndarray:
@@ -217,9 +217,9 @@ def test_keys_and_a_typed_value(screen):
     screen.do("key", "3", "key", "5")
     screen.until(lambda f: f["look"]["tier"] == "reference")
     screen.do("key", "s", "key", "k", "key", "question", "key", "p")
-    found = screen.until(lambda f: f["look"]["split"] == "scattering" and f["look"]["melanin"] != Look().melanin)
-    assert found["look"]["melanin"] in {s.melanin for s in lutgen.PRESETS.values()}
-    left, top, _, bottom = found["places"]["hemoglobin"]
+    frame = screen.until(lambda f: f["look"]["split"] == "scattering" and f["look"]["melanin"] != Look().melanin)
+    assert frame["look"]["melanin"] in {s.melanin for s in lutgen.PRESETS.values()}
+    left, top, _, bottom = frame["places"]["hemoglobin"]
     screen.do("mousemove", round(left + 20), round((top + bottom) / 2), "keydown", "ctrl", "click", 1, "keyup", "ctrl")
     screen.until(lambda f: f["typing"])
     screen.do("key", "ctrl+a", "type", "0.05")
@@ -247,21 +247,21 @@ def test_another_size_shows_the_whole_face(screen):
 
 def test_on_a_screen_of_many_dots_everything_is_as_large(tmp_path):
     """192 dots per inch: the picture has twice the pixels each way, the panel keeps its size in units."""
-    made = Screen(tmp_path, ["view", "--size", "140x120", "--json", *SET], 192)
+    screen = Screen(tmp_path, ["view", "--size", "140x120", "--json", *SET], 192)
     try:
-        assert made.frames[-1]["size"] == [280, 240]
+        assert screen.frames[-1]["size"] == [280, 240]
         out = tmp_path / "view.png"
         assert main(["view", "--screenshot", str(out), "--size", "280x240", *SET]) == 0
-        made.do("mousemove", 1, 1)
-        shown = made.picture(2 * panel.WIDTH, 280, 240)
+        screen.do("mousemove", 1, 1)
+        shown = screen.picture(2 * panel.WIDTH, 280, 240)
         with Image.open(out) as image:
             assert np.array_equal(shown, np.asarray(image).astype(int))
-        left, top, _, bottom = made.frames[-1]["places"]["melanin"]
-        made.do("mousemove", round(2 * (left + 100)), round(top + bottom), "click", 1)
-        made.until(lambda f: f["look"]["melanin"] > 0.03)
-        assert made.close() == 0
+        left, top, _, bottom = screen.frames[-1]["places"]["melanin"]
+        screen.do("mousemove", round(2 * (left + 100)), round(top + bottom), "click", 1)
+        screen.until(lambda f: f["look"]["melanin"] > 0.03)
+        assert screen.close() == 0
     finally:
-        made.kill()
+        screen.kill()
 
 
 def test_without_a_display_the_line_says_what_to_do():

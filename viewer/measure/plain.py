@@ -31,8 +31,8 @@ class Plain:
 def open_plain(stage: Stage, look: Look) -> Plain:
     """The color of a look's skin in a texture, and the program that reads it."""
     context = gl.context()
-    made = {"constants.glsl": "#define PLAIN_ALBEDO\n" + light.constants()}
-    program = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", made))
+    texts = {"constants.glsl": "#define PLAIN_ALBEDO\n" + light.constants()}
+    program = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", texts))
     vertices, indices = stage.buffers
     head = context.vertex_array(program, [(vertices, "3f 3f 2f", "position", "normal", "uv")], indices)
     target = context.framebuffer([stage.targets["reflected"]], stage.targets["depth"])
@@ -44,22 +44,22 @@ def _bake(stage: Stage, look: Look) -> moderngl.Texture:
     passes.set_oxygenation(stage, look.oxygenation)
     tables = stage.sides["none"].textures
     maps = {name: stage.maps[name] for name in ("chromophores", "detail")}
-    size = tuple(max(one.size[k] for one in maps.values()) for k in (0, 1))
-    once = gl.full_screen("albedo.frag.glsl", {"functions.glsl": tables.functions})
+    size = tuple(max(texture.size[k] for texture in maps.values()) for k in (0, 1))
+    baking = gl.full_screen("albedo.frag.glsl", {"functions.glsl": tables.functions})
     albedo = gl.texture(size, 4, "f1")
     target = gl.context().framebuffer([albedo])
-    sharp = {name: one.anisotropy for name, one in maps.items()}
-    for one in maps.values():
-        one.anisotropy = 1.0  # llvmpipe's filter for slanted views blurs straight ones too
+    sharp = {name: texture.anisotropy for name, texture in maps.items()}
+    for texture in maps.values():
+        texture.anisotropy = 1.0  # llvmpipe's filter for slanted views blurs straight ones too
     target.use()
     gl.context().enable_only(moderngl.NOTHING)
-    gl.bind(once.program, chromophore_map=maps["chromophores"], detail_map=maps["detail"],
+    gl.bind(baking.program, chromophore_map=maps["chromophores"], detail_map=maps["detail"],
             lut_color=tables.color)  # fmt: skip
-    gl.put(once.program, **passes.skin_of(stage, look))
-    once.array.render()
-    for name, one in maps.items():
-        one.anisotropy = sharp[name]
-    gl.free(target, once.array, once.program, once.corners)
+    gl.put(baking.program, **passes.skin_of(stage, look))
+    baking.array.render()
+    for name, texture in maps.items():
+        texture.anisotropy = sharp[name]
+    gl.free(target, baking.array, baking.program, baking.corners)
     return gl.filtered(albedo)
 
 

@@ -104,8 +104,8 @@ def scattered(
 @cache
 def disc(x: float = SIDE / 2, y: float = SIDE / 2, radius: float = DISC) -> np.ndarray:
     """Coverage [SIDE, SIDE] of a disc around (x, y), in pixels."""
-    at = (np.arange(SIDE * _FINE) + 0.5) / _FINE
-    inside = np.hypot(at[None] - x, at[:, None] - y) < radius
+    place = (np.arange(SIDE * _FINE) + 0.5) / _FINE
+    inside = np.hypot(place[None] - x, place[:, None] - y) < radius
     return inside.reshape(SIDE, _FINE, SIDE, _FINE).mean(axis=(1, 3))
 
 
@@ -150,8 +150,8 @@ def blurred_edge(plane: Plane, tone: str, mm_per_pixel: float) -> np.ndarray:
 
 def encircled(image: np.ndarray, x: float, y: float, radii: np.ndarray) -> np.ndarray:
     """Light [R, 3] of an image within whole radii in pixels around (x, y)."""
-    at = np.arange(SIDE) + 0.5
-    ring = np.ceil(np.hypot(at[None] - x, at[:, None] - y)).astype(int).ravel()
+    place = np.arange(SIDE) + 0.5
+    ring = np.ceil(np.hypot(place[None] - x, place[:, None] - y)).astype(int).ravel()
     parts = np.stack([np.bincount(ring, image[..., c].ravel(), SIDE) for c in range(3)], axis=1)
     return np.cumsum(parts, axis=0)[radii]
 
@@ -177,8 +177,8 @@ def searchlight(
         down, right = place // 4, place % 4
         light = np.roll(middle, (down, right), axis=(0, 1))[..., None]
         out = np.mean([scattered(plane, light, skin, mm_per_pixel, taps, f, tables) for f in range(frames)], axis=0)
-        found = encircled(out / whole, SIDE / 2 + right, SIDE / 2 + down, radii)
-        worst = max(worst, float(np.abs(found - plane.expected[key]).max()))
+        shares = encircled(out / whole, SIDE / 2 + right, SIDE / 2 + down, radii)
+        worst = max(worst, float(np.abs(shares - plane.expected[key]).max()))
     return worst
 
 

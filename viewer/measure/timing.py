@@ -38,10 +38,10 @@ class Cost:
 
 
 def report(
-    luts: LutSet, shape: Mesh, given: Maps, size: tuple[int, int], progress: Callable[[str], None] = lambda name: None
+    luts: LutSet, shape: Mesh, maps: Maps, size: tuple[int, int], progress: Callable[[str], None] = lambda name: None
 ) -> dict:
     """What `lutgen bench --viewer --json` prints of a head, its maps and a LUT set."""
-    stage = app.open_stage(luts, shape, given, size)
+    stage = app.open_stage(luts, shape, maps, size)
     try:
         game, tiers = costs(stage, Look(), rounds=ROUNDS, progress=progress)
         return {
@@ -75,13 +75,13 @@ def costs(
             before = _frame(stage, lambda: plain.draw(stage, game, look))
             for i in range(len(tiers)):
                 tier = tiers[(i + k) % len(tiers)]
-                found = _frame(stage, lambda t=tier: passes.draw(stage, looks[t]))
-                after = _frame(stage, lambda: plain.draw(stage, game, look))
+                tier_ms = _frame(stage, lambda t=tier: passes.draw(stage, looks[t]))
+                plain_ms = _frame(stage, lambda: plain.draw(stage, game, look))
                 if k:
-                    taken[tier].append(found)
-                    taken["plain"].append(after)
-                    ratios[tier].append(2 * sum(found.values()) / (sum(before.values()) + sum(after.values())))
-                before = after
+                    taken[tier].append(tier_ms)
+                    taken["plain"].append(plain_ms)
+                    ratios[tier].append(2 * sum(tier_ms.values()) / (sum(before.values()) + sum(plain_ms.values())))
+                before = plain_ms
     finally:
         plain.release(game)
     drawn = [_cost(tier, passes.TAPS[tier], passes.frames(looks[tier]), taken[tier], ratios[tier]) for tier in tiers]
@@ -95,9 +95,9 @@ def _frame(stage: Stage, draw: Callable[[], None]) -> dict[str, float]:
     return stage.milliseconds
 
 
-def _cost(name: str, taps: int, frames: int, found: list[dict[str, float]], ratios: list[float]) -> Cost:
-    each = {key: float(np.median([one[key] for one in found])) for key in found[0]}
-    total = float(np.median([sum(one.values()) for one in found]))
+def _cost(name: str, taps: int, frames: int, rounds: list[dict[str, float]], ratios: list[float]) -> Cost:
+    each = {key: float(np.median([passes_ms[key] for passes_ms in rounds])) for key in rounds[0]}
+    total = float(np.median([sum(passes_ms.values()) for passes_ms in rounds]))
     return Cost(name, taps, frames, each, total, float(np.median(ratios)), (min(ratios), max(ratios)))
 
 

@@ -84,9 +84,9 @@ def _texture(overlay: Overlay, wanted) -> None:
         if old is not None:
             old.release()
         pixels = np.asarray(wanted.get_pixels_array(), "u1").tobytes()
-        made = gl.context().texture((wanted.width, wanted.height), 4, pixels)
-        overlay.textures[made.glo] = made
-        wanted.set_tex_id(made.glo)
+        texture = gl.context().texture((wanted.width, wanted.height), 4, pixels)
+        overlay.textures[texture.glo] = texture
+        wanted.set_tex_id(texture.glo)
         wanted.set_status(status.ok)
     elif wanted.status == status.want_destroy:
         overlay.textures.pop(wanted.get_tex_id()).release()
