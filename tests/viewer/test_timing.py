@@ -178,7 +178,7 @@ def test_bench_prints_passes_tiers_and_ratios(capsys, monkeypatch):
         assert cost["total"] > 0
     assert told["tiers"]["reference"]["frames"] == passes.REFERENCE_FRAMES
     assert told["oxygenation_ms"] > 0
-    monkeypatch.setattr(timing, "report", lambda *_: told)
+    monkeypatch.setattr(timing, "report", lambda *_, progress: told)
     assert main(["bench", "--viewer"]) == 0
     table = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in table[2:8]] == ["plain", *looks.TIERS]
