@@ -31,6 +31,17 @@ class MachineError(RuntimeError):
     """
 
 
+def missing(needed: str, extra: str) -> MachineError:
+    """What to raise where an optional package is not there: `needed` says what needs which, `extra` brings it.
+
+    >>> raise missing("charts need matplotlib", "charts")
+    Traceback (most recent call last):
+    ...
+    lutgen.errors.MachineError: charts need matplotlib, which is missing: pip install "lutgen[charts]"
+    """
+    return MachineError(f'{needed}, which is missing: pip install "lutgen[{extra}]"')
+
+
 def shown(value: object) -> str:
     """A value's repr, shortened to one line."""
     try:

@@ -1,9 +1,11 @@
 """The layout: imports point down, the wheel's only top-level name is lutgen, no heavy import on a light path."""
 
 import ast
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -155,7 +157,7 @@ def test_wheel_holds_one_name_and_its_data(tmp_path):
         "exports/templates/page.html", "exports/templates/gather.frag.glsl",
         "tables/quadrature.csv", "color_tables.csv", "skin/hemoglobin_prahl_1998.csv", "viewer/__init__.py",
         "planning/plan.csv", "planning/plan.exr",
-        "exports/templates/import_lutgen.py.txt", "exports/templates/LutgenImporter.cs",
+        "exports/templates/import_lutgen.py.txt", "exports/templates/LutgenImporter.cs", "py.typed",
     ):  # fmt: skip
         assert f"lutgen/{name}" in names
 
@@ -170,3 +172,20 @@ def test_no_lock_file_and_no_path_of_a_machine():
         "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", "lutgen", "kernels", "viewer",
         "luts", "tests",
     }  # fmt: skip
+
+
+def test_the_citation_names_this_version():
+    cited = dict(re.findall(r"^([a-z-]+): (.+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert [cited[key] for key in ("title", "version", "license")] == [
+        project[k] for k in ("name", "version", "license")
+    ]
+
+
+def test_colour_science_is_an_extra():
+    """100 MB that no default path needs: only what makes and checks the built-in tables."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    assert not re.search("colour|scipy|matplotlib|xarray", " ".join(project["dependencies"]))
+    assert re.search("colour-science.*scipy", " ".join(extras["color"]))
+    assert all(re.search(r"lutgen\[.*\bcolor\b.*\]", " ".join(extras[name])) for name in ("all", "test"))

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.errors import InputError, MachineError
+from lutgen.errors import InputError, MachineError, missing
 from lutgen.tables.axes import Axis
 
 INK, GRAY, RULE = "#1a1a1a", "#595959", "#dddddd"
@@ -40,7 +40,7 @@ def _matplotlib():
         import matplotlib
         import matplotlib.figure
     except ImportError as error:
-        raise MachineError('charts need matplotlib, which is missing: pip install "lutgen[charts]"') from error
+        raise missing("charts need matplotlib", "charts") from error
     return matplotlib
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.errors import InputError, MachineError, in_range
+from lutgen.errors import InputError, MachineError, in_range, missing
 from lutgen.files import images
 
 SUFFIXES = (".glb", ".gltf", ".obj")
@@ -116,7 +116,7 @@ def _read(path: Path):
     try:
         import trimesh
     except ImportError as error:
-        raise MachineError('meshes need trimesh, which is missing: pip install "lutgen[view]"') from error
+        raise missing("meshes need trimesh", "view") from error
     try:
         scene = trimesh.load(path, process=False)
         parts = list(scene.geometry.values()) if isinstance(scene, trimesh.Scene) else [scene]
@@ -202,7 +202,7 @@ def _fetch(url: str, sha256: str) -> Path:
     try:
         import pooch
     except ImportError as error:
-        raise MachineError('fetching needs pooch, which is missing: pip install "lutgen[view]"') from error
+        raise missing("fetching needs pooch", "view") from error
     try:
         name = Path(url).name
         return Path(

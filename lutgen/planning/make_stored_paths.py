@@ -1,4 +1,4 @@
-"""Measure what `lutgen plan` predicts from; needs OpenCL, and OpenGL with `view`.
+"""Measure what `lutgen plan` predicts from; needs scipy (extra `color`), OpenCL, and OpenGL with `view`.
 
 Run as `python -m lutgen.planning.make_stored_paths`.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from types import ModuleType
 
-from lutgen.errors import MachineError
+from lutgen.errors import missing
 
 
 def viewer(module: str) -> ModuleType:
@@ -15,4 +15,4 @@ def viewer(module: str) -> ModuleType:
     except ImportError as error:
         if (error.name or "").startswith("lutgen"):
             raise
-        raise MachineError(f'the viewer needs {error.name}, which is missing: pip install "lutgen[view]"') from error
+        raise missing(f"the viewer needs {error.name}", "view") from error

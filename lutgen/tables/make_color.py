@@ -1,13 +1,20 @@
-"""Write the color tables from colour-science: `python -m lutgen.tables.make_color` (needs colour-science and scipy).
+"""Write the color tables from colour-science: `python -m lutgen.tables.make_color` (extra `color`).
 
 Color matching functions and the D65 spectrum every 5 nm from 380 to 780 nm. The functions derived from CIE 2006 start
 at 390 nm; they are 0 below.
 """
 
+from importlib.resources import files
 from pathlib import Path
 
-import colour
 import numpy as np
+
+from lutgen.errors import missing
+
+try:
+    import colour
+except ImportError as error:
+    raise missing("the color tables need colour-science", "color") from error
 
 WAVELENGTH_NM = np.arange(380, 781, 5)
 OBSERVERS = {
@@ -29,14 +36,14 @@ def columns() -> dict[str, np.ndarray]:
 
 
 def main() -> None:
-    """Write color_tables.csv beside this script."""
+    """Write lutgen/color_tables.csv, which lutgen/color.py reads."""
     table = columns()
     lines = [
         f"# CIE 1931 and CIE 2015 2 degree color matching functions, CIE D65; from colour-science {colour.__version__}",
         ",".join(table),
         *(",".join(f"{value:.9g}" for value in row) for row in zip(*table.values(), strict=True)),
     ]
-    (Path(__file__).parent / "color_tables.csv").write_text("\n".join(lines) + "\n")
+    Path(str(files("lutgen") / "color_tables.csv")).write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

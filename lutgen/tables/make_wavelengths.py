@@ -1,4 +1,4 @@
-"""Choose the few wavelengths that stand for a spectrum; needs scipy and OpenCL.
+"""Choose the few wavelengths that stand for a spectrum; needs scipy (extra `color`) and OpenCL.
 
 Run as `python -m lutgen.tables.make_wavelengths`.
 
