@@ -51,7 +51,7 @@ def write(source: Source, folder: Path) -> Report:
         "Input R, G, B: melanin, eumelanin, hemoglobin as coordinates t in 0 to 1 after the axis warp:",
         "; ".join(shader_axes.formulas(source.grid).values()),
         "Output: diffuse color in linear Rec. 709 (sRGB primaries, D65), clipped to 0 to 1; no transfer curve.",
-        f"Half texel: in a texture of it u = (t * {n - 1} + 0.5) / {n}; readers of .cube files do this themselves.",
+        f"Half texel: in a texture of it u = {shader_axes.texel('t', n)}; readers of .cube files do this themselves.",
         "Encoding: text, red (melanin) fastest, 7 fixed decimals, domain 0 to 1.",
         *MEANING,
         f"Error it adds: {largest:.2g} at most, {mean:.2g} on average at {len(source.skins)} skins, by resampling.",

@@ -54,7 +54,7 @@ def write(source: Source, folder: Path) -> Report:
         f"{SCENE}: {len(presets)} spheres, one a preset; skin_PRESET.tres: their materials; {SHADER}: the shader.",
         "Drop the folder into a project: Godot 4 imports the strips by their .import files. Give a material to a mesh.",
         f"{COLOR}: Texture3D {N_m} x {N_e} x {N_h} as {N_h} tiles; half, linear Rec. 709, unclipped.",
-        f"x melanin, y eumelanin, z hemoglobin: u = (t (N - 1) + 0.5) / N; t = {axes}.",
+        f"x melanin, y eumelanin, z hemoglobin: u = {shader_axes.texel('t', 'N')}; t = {axes}.",
         f"{PROFILE}: columns: quantiles (k + 0.5) / {lookup.QUANTILES}, rows: nodes; R radius in mm, GBA energy within",
         "(lutgen_ring, for your own gather). Maps: a texel t multiplies its slider by 4 t^3; import them lossless.",
         *MEANING,

@@ -13,6 +13,7 @@ import numpy as np
 from lutgen.exports.resampled import MADE, Preset, Report, Source, difference
 from lutgen.files import exr
 from lutgen.solvers import profiles
+from lutgen.tables.shader_axes import texel
 
 SIZE = (128, 64)
 """Texels along N.L and along curvature."""
@@ -79,9 +80,9 @@ def write(source: Source, folder: Path) -> Report:
     return Report((
         f"shade_PRESET.exr: {n} x {m}, N.L and curvature. transmission_PRESET.exr: {k} x 1, thickness.",
         "Half float, linear Rec. 709, ZIP. Sample bilinearly, clamped, without mips.",
-        f"u = ((N.L + 1) / 2 * {n - 1} + 0.5) / {n}; v = (c / {CURVATURE_PER_MM} * {m - 1} + 0.5) / {m};",
+        f"u = {texel('(N.L + 1) / 2', n)}; v = {texel(f'c / {CURVATURE_PER_MM}', m)};",
         "row 0 is a plane; curvature c in 1/mm: length(fwidth(normal)) / length(fwidth(position in mm)).",
-        f"Transmission: u = (pow(thickness / {THICKNESS_MM:g} mm, 1/3) * {k - 1} + 0.5) / {k}.",
+        f"Transmission: u = {texel(f'pow(thickness / {THICKNESS_MM:g} mm, 1/3)', k)}.",
         "shade * color of the preset * light is what leaves; 1 is a plane that the light hits head-on.",
         "transmission * color * light on the far side adds what comes through ears and nostrils.",
         "Made from the preset's own profile, integrated over a sphere of each curvature.",

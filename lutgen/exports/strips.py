@@ -8,7 +8,7 @@ import numpy as np
 
 from lutgen.exports.resampled import MADE, MEANING, Report, Source
 from lutgen.files import exr
-from lutgen.tables import shader_axes
+from lutgen.tables.shader_axes import formulas, texel
 
 FILES = {"color_rec709.exr": "srgb", "color_acescg.exr": "acescg"}
 CHROMATICITIES = {"srgb": exr.REC709, "acescg": exr.ACESCG}
@@ -21,7 +21,7 @@ def strip(cells: np.ndarray) -> np.ndarray:
 
 def write(source: Source, folder: Path) -> Report:
     """Write both strips into a folder, rows of low hemoglobin first in the file."""
-    error, axes = {}, shader_axes.formulas(source.grid)
+    error, axes = {}, formulas(source.grid)
     for name, space in FILES.items():
         half = source.own_colors(space).astype("f2")
         note = {"axes": axes, "space": space}
@@ -35,7 +35,7 @@ def write(source: Source, folder: Path) -> Report:
         f"x: melanin, {N_m} texels a tile; {N_e} tiles along eumelanin. y: hemoglobin, row 0 is the lowest.",
         "Space: linear Rec. 709 (D65), or linear ACEScg (ACES white, adapted from D65 by CAT02).",
         f"Axis warp to t in 0 to 1: {'; '.join(axes.values())}.",
-        f"Half texel: u = (t * {N_m - 1} + 0.5) / {N_m} in a tile, v = (t * {N_h - 1} + 0.5) / {N_h}. Mix two",
+        f"Half texel: u = {texel('t', N_m)} in a tile, v = {texel('t', N_h)}. Mix two",
         "tiles by eumelanin and keep u within its tile, or filtering bleeds into the neighbor.",
         *MEANING,
         f"Error it adds (half floats): {largest:.2g} at most at {len(source.skins)} random skins.",

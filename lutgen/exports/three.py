@@ -64,7 +64,7 @@ def write(source: Source, folder: Path) -> Report:
         f"{COLOR}: 3-D, {N_m} x {N_e} x {N_h}, RGBA half. {PROFILE}: 2-D. {CHUNK}: GLSL that reads both.",
         f"{PAGE}: all of it in one page, with sliders, in plain WebGL2; open it from the disk, it needs no network.",
         "three.js: new KTX2Loader().detectSupport(renderer).loadAsync(...); LinearFilter, clamped.",
-        "Color: linear Rec. 709, unclipped; x melanin, y eumelanin, z hemoglobin: u = (t (N - 1) + 0.5) / N,",
+        f"Color: linear Rec. 709, unclipped; x melanin, y eumelanin, z hemoglobin: u = {shader_axes.texel('t', 'N')},",
         f"t = {axes}.",
         f"Profile: column k: quantile (k + 0.5) / {lookup.QUANTILES}; row: node of {' x '.join(map(str, counts))}; "
         "radius mm, encircled energy.",

@@ -98,7 +98,7 @@ def write(source: Source, folder: Path) -> Report:
         "quantile; R is a radius in mm, G B A the share of red, green, blue light within it.",
         f"{CUBE}: {source.size} nodes an axis, clipped to 0 to 1; R G B = melanin, eumelanin, hemoglobin after the "
         f"warp. lutgen.hlsl is for the textures; its Lutgen*_float for Shader Graph's Custom Function (File).",
-        f"Axis warp: {'; '.join(axes.values())}; half texel: u = (t * (n - 1) + 0.5) / n; both are in "
+        f"Axis warp: {'; '.join(axes.values())}; half texel: u = {shader_axes.texel('t', 'n')}; both are in "
         "lutgen.hlsl.",
         "Diffusion Profile: scattering color * multiplier = D in mm of the closest Burley shape, 1 unit = 1 m, "
         f"IOR {n:g}; filter radius {FILTER_RADIUS} D; 20, 40 or 80 samples by quality; at most {PROFILES} profiles in "

@@ -91,7 +91,7 @@ def write(source: Source, folder: Path) -> Report:
         "is a radius in mm, G B A the share of red, green, blue light within it.",
         "custom_node_*.hlsl: code of Custom nodes: inputs lut, skin (float3 out) or profile, quantile, skin (float4);"
         " or lutgen.ush in PROJECT/Shaders, included as /Project/lutgen.ush. Skin: melanin, eumelanin, hemoglobin.",
-        f"Axis warp: {'; '.join(axes.values())}; half texel: u = (t * (n - 1) + 0.5) / n; both in the "
+        f"Axis warp: {'; '.join(axes.values())}; half texel: u = {shader_axes.texel('t', 'n')}; both in the "
         "HLSL.",
         "Subsurface Profile: color * distance * world unit scale = 0.6 (1.85 - A + 7 |A - 0.8|^3) d in cm, A the color,"
         f" d the closest Burley shape's; mean free path must stay enabled; IOR {n:g} (the engine's own is 1.55).",

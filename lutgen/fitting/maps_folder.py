@@ -70,7 +70,7 @@ def _axis_formula(axis: Axis) -> str:
     if axis.count == 1:
         return f"{axis.name} is {axis.low:g} throughout"
     value = shader_axes.unwarp(axis, "t", "text")
-    return f"{axis.name}: {value}; the LUT's texture coordinate is (t {axis.count - 1} + 0.5) / {axis.count}"
+    return f"{axis.name}: {value}; the LUT's texture coordinate is {shader_axes.texel('t', axis.count)}"
 
 
 def out_of_reach(found: Inversion) -> np.ndarray:

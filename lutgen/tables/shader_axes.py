@@ -44,6 +44,16 @@ def unwarp(axis: Axis, t: str, language: str = "glsl") -> str:
     return _call(language, "exp", even) if p == 0 else _call(language, "pow", even, _number(1 / p, language))
 
 
+def texel(t: str, count: int | str) -> str:
+    """Expression of the texture coordinate of t in 0 to 1: its ends are the centers of the outer texels.
+
+    >>> texel("t", 16), texel("t", "n")
+    ('(t * 15 + 0.5) / 16', '(t * (n - 1) + 0.5) / n')
+    """
+    last = f"({count} - 1)" if isinstance(count, str) else count - 1
+    return f"({t} * {last} + 0.5) / {count}"
+
+
 def coordinate(axis: Axis, value: str, language: str = "glsl") -> str:
     """Expression of the texture coordinate of a value, clamped to the axis.
 
