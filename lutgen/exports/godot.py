@@ -13,7 +13,7 @@ import numpy as np
 
 from lutgen.exports import lookup
 from lutgen.exports.engine_textures import slices
-from lutgen.exports.resampled import AXES, MADE, MEANING, Preset, Report, Source, difference
+from lutgen.exports.resampled import AXES, MADE, MEANING, Preset, Report, Source
 from lutgen.files import exr
 from lutgen.tables import shader_axes
 
@@ -48,7 +48,7 @@ def write(source: Source, folder: Path) -> Report:
     }  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    error = {"color": source.color_error(source.grid, half), "profile": difference(table.astype("f2"), table)}
+    error, error_line = lookup.half_error(source, half, table)
     axes = "; ".join(formula.removeprefix("t = ") for formula in formulas.values())
     return Report((
         f"{SCENE}: {len(presets)} spheres, one a preset; skin_PRESET.tres: their materials; {SHADER}: the shader.",
@@ -58,8 +58,7 @@ def write(source: Source, folder: Path) -> Report:
         f"{PROFILE}: columns: quantiles (k + 0.5) / {lookup.QUANTILES}, rows: nodes; R radius in mm, GBA energy within",
         "(lutgen_ring, for your own gather). Maps: a texel t multiplies its slider by 4 t^3; import them lossless.",
         *MEANING,
-        f"Error it adds (half floats): color {error['color']['largest']:.2g}, radius in mm or encircled energy "
-        f"{error['profile']['largest']:.2g} at most.",
+        error_line,
         MADE,
     ), error)  # fmt: skip
 

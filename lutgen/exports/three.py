@@ -16,7 +16,7 @@ from PIL import Image
 from lutgen.color import encode_srgb
 from lutgen.exports import lookup
 from lutgen.exports.ktx2 import UNSPECIFIED, ktx2
-from lutgen.exports.resampled import MADE, MEANING, Report, Source, difference
+from lutgen.exports.resampled import MADE, MEANING, Report, Source
 from lutgen.files import texture_maps
 from lutgen.head import builtin, paint
 from lutgen.tables import shader_axes
@@ -56,7 +56,7 @@ def write(source: Source, folder: Path) -> Report:
         (folder / name).write_bytes(content)
     (folder / PAGE).write_text(page(source, written), encoding="utf-8")
 
-    error = {"color": source.color_error(source.grid, color[..., :3]), "profile": difference(profile, table)}
+    error, error_line = lookup.half_error(source, color[..., :3], table)
     N_h, N_e, N_m = source.grid.shape
     counts = source.luts.profile_lut.grid.shape[::-1]
     axes = "; ".join(formula.removeprefix("t = ") for formula in formulas.values())
@@ -69,8 +69,7 @@ def write(source: Source, folder: Path) -> Report:
         f"Profile: column k: quantile (k + 0.5) / {lookup.QUANTILES}; row: node of {' x '.join(map(str, counts))}; "
         "radius mm, encircled energy.",
         *MEANING,
-        f"Error it adds (half floats): color {error['color']['largest']:.2g}, radius in mm or encircled energy "
-        f"{error['profile']['largest']:.2g} at most.",
+        error_line,
         MADE,
     ), error)  # fmt: skip
 
