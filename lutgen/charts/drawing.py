@@ -1,4 +1,4 @@
-"""Charts on disk: each as SVG, PNG and the numbers behind it as CSV; the only matplotlib import.
+"""Charts on disk, and what every one of them repeats: each as SVG, PNG and its numbers as CSV; the only matplotlib.
 
 Figures are made without pyplot, so no display, no window and no state of the process is touched. The same numbers
 give the same SVG, byte for byte: its ids are salted, and it carries no date.
@@ -12,9 +12,10 @@ import errno
 import io
 import os
 import shutil
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,22 +45,52 @@ def _matplotlib():
     return matplotlib
 
 
+def silent(stage: str, tally: object) -> None:
+    """Progress that no one hears."""
+
+
 @contextlib.contextmanager
-def figure(width: float, height: float, title: str, subtitle: str = "") -> Iterator:
-    """A figure of that size in inches under the house style, its title and a line of explanation at the top left."""
+def figure(folder: Path, name: str, rows: Sequence, size: tuple[float, float], title: str, notes: str = "") -> Iterator:
+    """A figure of that size in inches under the house style, its title and lines of explanation at the top left.
+
+    Once drawn it is written as NAME.svg and NAME.png, its rows (dicts or dataclasses) as NAME.csv: their fields in
+    order of appearance, empty where a row has none.
+    """
     matplotlib = _matplotlib()
     plain = {key: value for key, value in matplotlib.rcParamsDefault.items() if key != "backend"}
     with matplotlib.rc_context(plain | _STYLE):  # type: ignore[arg-type]
-        drawn = matplotlib.figure.Figure((width, height))
-        drawn.text(0.18 / width, 1 - 0.15 / height, title, size=14, va="top")
-        drawn.text(0.18 / width, 1 - 0.46 / height, subtitle, color=GRAY, va="top", linespacing=1.35)
+        drawn = matplotlib.figure.Figure(size)
+        write(drawn, 0.18, 0.15, title, size=14, va="top")
+        write(drawn, 0.18, 0.46, notes, color=GRAY, va="top", linespacing=1.35)
         yield drawn
+        _save(drawn, folder, name, [row if isinstance(row, dict) else asdict(row) for row in rows])
 
 
 def inches(drawn, left: float, top: float, width: float, height: float):
     """Axes of a figure at a place in inches from its top left corner."""
     across, down = drawn.get_size_inches()
     return drawn.add_axes((left / across, 1 - (top + height) / down, width / across, height / down))
+
+
+def write(drawn, left: float, top: float, words: str, **style: Any) -> None:
+    """Write on a figure at a place in inches from its top left corner."""
+    across, down = drawn.get_size_inches()
+    drawn.text(left / across, 1 - top / down, words, **style)
+
+
+def ground(pad: float) -> dict:
+    """White behind words (`bbox`), that many points wider than they are."""
+    return {"facecolor": "white", "edgecolor": "none", "pad": pad}
+
+
+def leader(color: str, width: float = 0.7, end: float = 4, **style: Any) -> dict:
+    """A thin line (`arrowprops`) from words to what they name, ending so many points before it."""
+    return {"arrowstyle": "-", "color": color, "linewidth": width, "shrinkA": 0, "shrinkB": end} | style
+
+
+def note(axes, words: str, point: tuple[float, float], points: tuple[float, float], **style: Any) -> None:
+    """Write beside a point of the data, so many points right of it and above."""
+    axes.annotate(words, point, points, textcoords="offset points", **style)
 
 
 def apart(places: Sequence[float] | np.ndarray, least: float) -> np.ndarray:
@@ -90,10 +121,8 @@ def label_ends(axes, x: float, labels: Sequence[tuple[float, str, str]], least: 
     moved = apart(np.log10(ends) if log else ends, least)
     for (y, words, color), place in zip(labels, 10**moved if log else moved, strict=True):
         placed = {"textcoords": ("offset points", "data"), "annotation_clip": False}
-        line = {"arrowstyle": "-", "color": color, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 2}
-        ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
-        axes.annotate(words, (x, y), (16, place), color=color, size=size, va="center", bbox=ground, **placed)
-        axes.annotate("", (x, y), (14, place), arrowprops=line, **placed)
+        axes.annotate(words, (x, y), (16, place), color=color, size=size, va="center", bbox=ground(0.8), **placed)
+        axes.annotate("", (x, y), (14, place), arrowprops=leader(color, end=2), **placed)
 
 
 def strip(axes, rgb: np.ndarray, words: str = "", fill: str = INK) -> None:
@@ -131,12 +160,12 @@ class HeatMap:
 def heat_maps(drawn, maps: Sequence[HeatMap], top: float, ends: tuple[float, float], label: str) -> None:
     """Draw maps, three in a row from `top` inches on, in one logarithmic color scale with its bar at their right."""
     meshes = []
-    for i, one in enumerate(maps):
+    for i, heat in enumerate(maps):
         axes = inches(drawn, 0.95 + 4.0 * (i % 3), top + 3.1 * (i // 3), 3.35, 1.75)
-        meshes.append(_cells(axes, one, ends))
-        axes.set_title(one.title, pad=29)
-        axes.text(0, 1.03, one.words, transform=axes.transAxes, va="bottom", color=GRAY, size=8.5, linespacing=1.3)
-        for side, axis in (("x", one.x), ("y", one.y)):
+        meshes.append(_cells(axes, heat, ends))
+        axes.set_title(heat.title, pad=29)
+        axes.text(0, 1.03, heat.words, transform=axes.transAxes, va="bottom", color=GRAY, size=8.5, linespacing=1.3)
+        for side, axis in (("x", heat.x), ("y", heat.y)):
             if side == "x" or i % 3 == 0 or axis.name != maps[i - 1].y.name:
                 axes.set(**{f"{side}label": axis.name + ("" if axis.unit == "1" else f" ({axis.unit})")})
             if axis.spacing == "log":
@@ -148,27 +177,26 @@ def heat_maps(drawn, maps: Sequence[HeatMap], top: float, ends: tuple[float, flo
     drawn.colorbar(meshes[0], cax=place, label=label, extend="both")
 
 
-def _cells(axes, one: HeatMap, ends: tuple[float, float]):
+def _cells(axes, heat: HeatMap, ends: tuple[float, float]):
     """Draw a map without its words; what a color bar is made of."""
-    axes.set(xscale=one.x.spacing, yscale=one.y.spacing)
-    x, y = one.x.values, one.y.values
+    axes.set(xscale=heat.x.spacing, yscale=heat.y.spacing)
+    x, y = heat.x.values, heat.y.values
     style = {"norm": "log", "vmin": ends[0], "vmax": ends[1], "cmap": "viridis", "rasterized": True}
-    mesh = axes.pcolormesh(x, y, np.clip(one.values, *ends), **style)
-    change = np.diff(np.pad(one.hatched, ((1, 1), (0, 0))).astype(int), axis=0).T  # 1 where a run starts, -1 behind it
+    mesh = axes.pcolormesh(x, y, np.clip(heat.values, *ends), **style)
+    change = np.diff(np.pad(heat.hatched, ((1, 1), (0, 0))).astype(int), axis=0).T  # 1 where a run starts, -1 behind it
     (column, low), (_, high) = np.nonzero(change == 1), np.nonzero(change == -1)
     style = {"fill": False, "linewidth": 0, "edgecolor": (0.1, 0.1, 0.1, 0.6), "hatch": "///", "align": "edge"}
     axes.bar(x[column], y[high] - y[low], np.diff(x)[column], y[low], **style)
-    axes.plot(*_borders(one.hatched, x, y), color=INK, linewidth=0.8)
+    axes.plot(*_borders(heat.hatched, x, y), color=INK, linewidth=0.8)
     for color, width in (("white", 4.0), (INK, 1.9)):
-        axes.plot(*_borders(one.outlined, x, y), color=color, linewidth=width, solid_capstyle="projecting")
+        axes.plot(*_borders(heat.outlined, x, y), color=color, linewidth=width, solid_capstyle="projecting")
     axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
     return mesh
 
 
-def save(drawn, folder: Path, name: str, rows: Sequence[dict]) -> None:
-    """Write a figure as NAME.svg and NAME.png and its rows (all with the same keys) as NAME.csv."""
+def _save(drawn, folder: Path, name: str, rows: list[dict]) -> None:
     written = io.StringIO()
-    table = csv.DictWriter(written, list(rows[0]), lineterminator="\n")
+    table = csv.DictWriter(written, dict.fromkeys(key for row in rows for key in row), lineterminator="\n")
     table.writeheader()
     table.writerows({key: f"{v:.6g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows)
     svg, png = io.BytesIO(), io.BytesIO()
@@ -206,3 +234,16 @@ def folder(out: Path) -> Iterator[Path]:
         raise kind(f"out = {out}: cannot be written ({error.strerror or error}); {advice}") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def draw_all(out: Path, charts: Mapping[str, Callable[[Path], str]], progress: Callable) -> dict[str, str]:
+    """Draw charts into the folder `out`, which appears whole or not at all; what each shows in a line, by its name.
+
+    Raises InputError where `out` holds something, MachineError without matplotlib.
+    """
+    shown = {}
+    with folder(out) as partial:
+        for name, chart in charts.items():
+            progress(name, None)
+            shown[name] = chart(partial)
+    return shown

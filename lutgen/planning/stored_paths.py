@@ -57,21 +57,21 @@ def paths() -> PathTable:
     )  # fmt: skip
 
 
-def at(found: PathTable, rule: str) -> tuple[PathTable, np.ndarray]:
+def at_rule(traced: PathTable, rule: str) -> tuple[PathTable, np.ndarray]:
     """Paths at a rule's wavelengths and their ACEScg weights [K, 3], from paths at wavelengths that share nodes."""
     chosen = wavelengths.load(rule)
     nm = chosen.wavelength_nm
-    shared = found.nu_per_mm, found.mu_epidermis, found.mu_dermis
+    shared = traced.nu_per_mm, traced.mu_epidermis, traced.mu_dermis
     nu, mu_e, mu_d = (np.repeat(values[:1], len(nm), axis=0) for values in shared)
-    energy = np.tensordot(interpolation_matrix(found.wavelength_nm, nm), found.energy, axes=1)
-    table = replace(found, wavelength_nm=nm, nu_per_mm=nu, mu_epidermis=mu_e, mu_dermis=mu_d, energy=energy)
+    energy = np.tensordot(interpolation_matrix(traced.wavelength_nm, nm), traced.energy, axes=1)
+    table = replace(traced, wavelength_nm=nm, nu_per_mm=nu, mu_epidermis=mu_e, mu_dermis=mu_d, energy=energy)
     return table, rgb_weights(chosen.xyz_weights)
 
 
 @cache
 def stored(rule: str) -> tuple[PathTable, np.ndarray]:
     """The stored paths at a rule's wavelengths, and their ACEScg weights [K, 3]."""
-    return at(paths(), rule)
+    return at_rule(paths(), rule)
 
 
 def within(radius_edges_mm: np.ndarray, radius_mm: np.ndarray) -> np.ndarray:

@@ -85,7 +85,7 @@ def truth(needs: Needs, recipe: Recipe, traced: PathTable) -> Truth:
 
 def _traced(right: Truth, rule: str) -> np.ndarray:
     """Encircled energy [O, Q, 3, R] of the reference at a rule's wavelengths."""
-    table, weights = stored_paths.at(right.traced, rule)
+    table, weights = stored_paths.at_rule(right.traced, rule)
     within = stored_paths.within(table.radius_edges_mm, right.radius_mm).T
     own = [_own(table, weights, right.profile_skins, o) for o in right.needs.oxygenations]
     return np.array([profiles.encircled(energy) @ within for energy in own])

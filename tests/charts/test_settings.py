@@ -8,6 +8,7 @@ import pytest
 
 import lutgen
 from lutgen.charts.accuracy import settings
+from lutgen.planning.stored_paths import at_rule
 from lutgen.solvers import profiles
 from lutgen.solvers.paths import interpolation_matrix
 from lutgen.tables import expand, wavelengths
@@ -46,16 +47,17 @@ def _number(cell: str) -> float | str:
 
 def test_exact_colors_are_those_of_the_solver(exact):
     """Without photons: within the 3e-6 of reflectance that lutgen/solvers/exact_totals.py promises."""
-    found = settings.acescg(settings.at(exact, "5nm"), settings._weights("5nm"), SKINS)[..., 0]
-    for melanin, eumelanin, hemoglobin, rgb in zip(*SKINS, found, strict=True):
+    table, weights = at_rule(exact, "5nm")
+    colors = settings.acescg(table, weights, SKINS)[..., 0]
+    for melanin, eumelanin, hemoglobin, rgb in zip(*SKINS, colors, strict=True):
         skin = lutgen.Skin(float(melanin), float(eumelanin), float(hemoglobin))
         spectrum = lutgen.spectrum(skin, method="adding-doubling")
-        assert rgb == pytest.approx(spectrum @ settings._weights("5nm"), abs=1e-5)
+        assert rgb == pytest.approx(spectrum @ weights, abs=1e-5)
 
 
 def test_a_table_errs_nowhere_at_its_nodes_and_half_by_its_rounding(exact):
     """Half rounds a channel by 2**-11 at most, float by 2**-24; between the nodes both err more."""
-    table, weights = settings.at(exact, "5nm"), settings._weights("5nm")
+    table, weights = at_rule(exact, "5nm")
     nodes = settings.grid((5, 3, 4), "cbrt", "linear")
     at_nodes, between = (v.ravel() for v in nodes.nodes()), settings._skins(50)
     off = {}
@@ -64,7 +66,7 @@ def test_a_table_errs_nowhere_at_its_nodes_and_half_by_its_rounding(exact):
         rows = settings.table_rows(
             ((5, 3, 4),), skins, "error",
             lambda grid: expand.color_cells(table, grid, settings._absorbers(table), weights),
-            lambda found, truth=truth: np.abs(found / truth - 1),
+            lambda colors, truth=truth: np.abs(colors / truth - 1),
         )  # fmt: skip
         off |= {(name, row["stored"]): row["error_max"] for row in rows if row["spacing"] == settings.CUBE_ROOT}
         assert {row["bytes"] for row in rows} == {5 * 3 * 4 * 12, 5 * 3 * 4 * 6}
@@ -76,27 +78,28 @@ def test_a_table_errs_nowhere_at_its_nodes_and_half_by_its_rounding(exact):
 def test_traced_paths_between_their_wavelengths_are_right(exact):
     """Interpolated in wavelength, totals stay within 5 sigma of exact ones; sigma interpolated the same way."""
     few = settings.traced_paths(2**14, seed=3).totals()
-    mu = expand.coefficients(wavelengths.load("8").wavelength_nm, settings._absorbers(settings.at(few, "8")), *SKINS)
-    found, truth = (settings.at(paths, "8").evaluate(*mu)[:, 0] for paths in (few, exact))
+    mu = expand.coefficients(wavelengths.load("8").wavelength_nm, settings._absorbers(at_rule(few, "8")[0]), *SKINS)
+    mean, truth = (at_rule(paths, "8")[0].evaluate(*mu)[:, 0] for paths in (few, exact))
     across = interpolation_matrix(few.wavelength_nm, wavelengths.load("8").wavelength_nm)
-    sigma = np.zeros_like(found)
-    for k in range(len(found)):
+    sigma = np.zeros_like(mean)
+    for k in range(len(mean)):
         pair = [np.repeat(values[k : k + 1], settings.TRACE_WAVELENGTHS, axis=0) for values in mu]
         sigma[k] = np.sqrt(across[k] ** 2 @ few.std_error(*pair)[:, 0] ** 2)
-    assert (np.abs(found - truth) < 5 * sigma).all()
+    assert (np.abs(mean - truth) < 5 * sigma).all()
     assert (sigma < 0.03 * truth.max()).all()
 
 
 def test_rules_err_as_their_file_says_and_noise_cancels():
     """Other skins and paths than the file's: p95 within 15 % and 3 noises. Noise is far below that of the profiles."""
     skins = settings._skins(60)
-    found, noise = settings.profile_errors(2**16, skins)
+    off, noise = settings.profile_errors(2**16, skins)
     stored = np.array([wavelengths.load(rule).profile_error[0] for rule in settings.RULES])
-    p95, noise_p95 = (np.percentile(values, 95, axis=1) for values in (found, noise))
+    p95, noise_p95 = (np.percentile(values, 95, axis=1) for values in (off, noise))
     assert (np.abs(p95 - stored) < 0.15 * stored + 3 * noise_p95).all()
-    seeds = [settings.at(settings.traced_paths(2**16, seed), "8") for seed in settings.TRACE_SEEDS]
-    one, other = (settings.acescg(paths, settings._weights("8"), skins) for paths in seeds)
-    own = np.percentile(profiles.ee_difference(np.maximum(one, 0), np.maximum(other, 0), EDGES).max(axis=-1) / 2, 95)
+    seeds = (at_rule(settings.traced_paths(2**16, seed), "8") for seed in settings.TRACE_SEEDS)
+    first, second = (np.maximum(settings.acescg(*table, skins), 0) for table in seeds)
+    apart = profiles.ee_difference(first, second, EDGES)
+    own = np.percentile(apart.max(axis=-1) / 2, 95)
     assert noise_p95[settings.RULES.index("8")] < own / 5
 
 
@@ -141,17 +144,17 @@ def test_the_titles_are_true(drawn):
     assert (rules["12"]["wavelengths"], rules["10nm"]["wavelengths"]) == (12, 41)
     for name, kind in (("axes", "delta_e00"), ("profile-axes", "ee_difference")):
         rows = [row for row in rows_of(drawn, name) if row["part"] == "table"]
-        at = {(row["spacing"], row["nodes"], row["stored"]): row for row in rows}
+        by_table = {(row["spacing"], row["nodes"], row["stored"]): row for row in rows}
         for nodes in {row["nodes"] for row in rows}:
             for which in ("p95", "max"):
                 cube, *others = (
-                    at[s, nodes, "float"][f"{kind}_{which}"] for s in (settings.CUBE_ROOT, "linear", "log")
+                    by_table[s, nodes, "float"][f"{kind}_{which}"] for s in (settings.CUBE_ROOT, "linear", "log")
                 )
                 assert cube < min(others)
                 if name == "profile-axes":
-                    half = at[settings.CUBE_ROOT, nodes, "half"][f"{kind}_{which}"]
+                    half = by_table[settings.CUBE_ROOT, nodes, "half"][f"{kind}_{which}"]
                     assert half == pytest.approx(cube, rel=0.03)
-            assert at["log", nodes, "half"]["bytes"] == at["log", nodes, "float"]["bytes"] / 2
+            assert by_table["log", nodes, "half"]["bytes"] == by_table["log", nodes, "float"]["bytes"] / 2
 
 
 def test_the_default_profile_table_errs_as_its_manifest_says(drawn):

@@ -76,7 +76,7 @@ def run(capsys, *arguments):
 
 def test_stored_paths_are_right_within_their_noise(exact):
     """Totals of the stored paths lie within 5 sigma of exact ones, on skins of every tone."""
-    table, _ = stored_paths.at(stored_paths.paths(), "12")
+    table, _ = stored_paths.at_rule(stored_paths.paths(), "12")
     skins = bake.random_skins(default_grid(2, 2, 2), 100, 3)
     absorb = expand.absorbers(table.wavelength_nm, 0.7)
     mu = expand.coefficients(table.wavelength_nm, absorb, *skins)

@@ -12,7 +12,7 @@ import numpy as np
 from lutgen import device as ocl
 from lutgen import solvers
 from lutgen.charts import drawing
-from lutgen.charts.drawing import GRAY, HUES, INK, RULE, inches
+from lutgen.charts.drawing import GRAY, HUES, INK, RULE, ground, inches, note, write
 from lutgen.skin.tissue import layers, preset
 from lutgen.solvers import direct, path_table
 from lutgen.tables.bake import skin_medium
@@ -36,7 +36,6 @@ _FIXED_LIFE = "(vf)(mean_life)"
 _EVEN_BLOCKS = 64  # blocks that keep every core busy to the end
 _TITLES = ("time per event (ns)", "× events per photon", "× photons to 1 % error", "= time to 1 % error (ms)")
 _LOOKS = {walk: (HUES[k], shape) for walk, k, shape in zip(WALKS, (0, 0, 0, 2, 2, 1), "oooDDs", strict=True)}
-_PAPER = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 _WIDTH, _TOP, _ROW, _GROUP = 13.6, 1.45, 0.235, len(WALKS) + 1.7  # inches, the last in rows
 _FOOT = (
     "An event is a scattering or, in direct, a surface met. Error: standard error of the diffuse reflectance over its "
@@ -47,7 +46,7 @@ _FOOT = (
 
 @dataclass(frozen=True)
 class Cost:
-    """What one walk cost at one place: FACTORS in each round [R, 4], and what all rounds together found."""
+    """What one walk cost at one place: FACTORS in each round [R, 4], and the reflectance of all rounds together."""
 
     photons: int
     factors: np.ndarray
@@ -125,17 +124,17 @@ def _cost(sums: np.ndarray, photons: int, name: str, nm: float) -> Cost:
     return Cost(photons, np.array(each), mean, float(np.sqrt((second - mean**2) / (photons * len(sums)))), exact)
 
 
-def over(one: Cost, other: Cost, factor: str) -> float:
+def over(cost: Cost, other: Cost, factor: str) -> float:
     """The median of a factor of one walk over that of another."""
     k = FACTORS.index(factor)
-    return float(np.median(one.factors[:, k]) / np.median(other.factors[:, k]))
+    return float(np.median(cost.factors[:, k]) / np.median(other.factors[:, k]))
 
 
 def walks(folder: Path, quick: bool) -> str:
     """Draw time per event, events, photons and time to an error of 1 %, for each walk and skin."""
     device = ocl.choose()
     events, rounds = QUICK if quick else FULL
-    found = measure(events, rounds, device)
+    costs = measure(events, rounds, device)
     cores = f" with {os.cpu_count()} cores" if device.kind == "cpu" else ""
     notes = (
         f"Marks: medians of {rounds} rounds in turn; thin bars: all rounds. Wall time on {device.name}{cores}: records "
@@ -145,16 +144,16 @@ def walks(folder: Path, quick: bool) -> str:
     )
     rows = len(PLACES) * _GROUP
     height = _TOP + _ROW * rows + 0.75
-    with drawing.figure(_WIDTH, height, _title(found), notes) as drawn:
+    table = [_row(costs, case) for case in costs]
+    with drawing.figure(folder, "walks", table, (_WIDTH, height), _title(costs), notes) as drawn:
         panels = [inches(drawn, 2.35 + 2.5 * k, _TOP, 1.75, _ROW * rows) for k in range(len(FACTORS))]
-        every = np.concatenate([cost.factors for cost in found.values()])
+        every = np.concatenate([cost.factors for cost in costs.values()])
         for axes, words, values in zip(panels, _TITLES, every.T, strict=True):
             _dress(axes, words, values, rows)
         for i, place in enumerate(PLACES):
-            _group(panels, place, {walk: found[*place, walk] for walk in WALKS}, i * _GROUP)
-        drawn.text(0.18 / _WIDTH, 0.12 / height, _FOOT, color=GRAY, size=8.5, linespacing=1.35)
-        drawing.save(drawn, folder, "walks", [_row(found, case) for case in found])
-    return _told(found)
+            _group(panels, place, {walk: costs[*place, walk] for walk in WALKS}, i * _GROUP)
+        write(drawn, 0.18, height - 0.12, _FOOT, color=GRAY, size=8.5, linespacing=1.35)
+    return _told(costs)
 
 
 def _dress(axes, title: str, values: np.ndarray, rows: float) -> None:
@@ -163,8 +162,8 @@ def _dress(axes, title: str, values: np.ndarray, rows: float) -> None:
         axes.set(xlim=(0, 1.05 * values.max()))
     else:
         low, high = values.min() / 1.3, values.max() * 1.3
-        at = [m * 10.0**e for e in range(7) for m in (1, 3) if low < m * 10.0**e < high]
-        axes.set(xscale="log", xlim=(low, high), xticks=at)
+        ticks = [m * 10.0**e for e in range(7) for m in (1, 3) if low < m * 10.0**e < high]
+        axes.set(xscale="log", xlim=(low, high), xticks=ticks)
         axes.xaxis.set_minor_formatter("")
     axes.xaxis.set_major_formatter("{x:,.0f}")
     axes.set(ylim=(rows - 0.6, -0.9), yticks=[])
@@ -178,24 +177,24 @@ def _group(panels, place: tuple[str, float], costs: dict[str, Cost], top: float)
     beside = {"transform": panels[0].get_yaxis_transform(), "va": "center"}
     name, nm = place
     words = f"{name} skin at {nm:.0f} nm, diffuse reflectance {costs['albedo'].exact:.3f}"
-    panels[0].text(-1.24, top, words, weight="bold", bbox=_PAPER, **beside)
+    panels[0].text(-1.24, top, words, weight="bold", bbox=ground(0.6), **beside)
     lines = {walk: top + row for row, walk in enumerate(costs, 1)}
     for walk, cost in costs.items():
         y, (hue, shape) = lines[walk], _LOOKS[walk]
         panels[0].text(-0.04, y, WALKS[walk], color=hue, ha="right", **beside)
-        notes = ["", "", "", ""]
+        remarks = ["", "", "", ""]
         if walk in ("continuous", "mixed"):
-            notes[0] = f"  {100 * over(cost, costs['albedo'], 'ns_per_event') - 100:+.0f} %"
+            remarks[0] = f"  {100 * over(cost, costs['albedo'], 'ns_per_event') - 100:+.0f} %"
         if walk == "mixed":
-            notes[3] = "  bias {:+.2f} ± {:.2f} %".format(*(100 * v for v in cost.bias)).replace("-", "−")
-        for axes, values, note in zip(panels, cost.factors.T, notes, strict=True):
+            remarks[3] = "  bias {:+.2f} ± {:.2f} %".format(*(100 * v for v in cost.bias)).replace("-", "−")
+        for axes, values, remark in zip(panels, cost.factors.T, remarks, strict=True):
             middle = float(np.median(values))
             axes.axhline(y, color=RULE, linewidth=0.6)
             axes.plot([values.min(), values.max()], [y, y], color=hue, linewidth=1.2)
             axes.plot(middle, y, shape, markersize=5.5, color=hue, markerfacecolor="white" if walk == "mixed" else hue)
-            words = (f"{middle:,.0f}" if middle >= 99.95 else f"{middle:#.3g}") + note
-            placed = {"textcoords": "offset points", "annotation_clip": False, "bbox": _PAPER}
-            axes.annotate(words, (float(values.max()), y), (7, 0), va="center", size=8.5, **placed)
+            words = (f"{middle:,.0f}" if middle >= 99.95 else f"{middle:#.3g}") + remark
+            placed = {"va": "center", "size": 8.5, "annotation_clip": False, "bbox": ground(0.6)}
+            note(axes, words, (float(values.max()), y), (7, 0), **placed)
     right = {"transform": panels[3].get_yaxis_transform(), "clip_on": False}
     a, b = lines["bake nu"], lines["capped"]
     panels[3].plot([1.36, 1.4, 1.4, 1.36], [a, a, b, b], color=INK, linewidth=0.9, **right)
@@ -203,23 +202,23 @@ def _group(panels, place: tuple[str, float], costs: dict[str, Cost], top: float)
     panels[3].text(1.45, (a + b) / 2, f"{ratio:.2f} ×\nas fast", va="center", weight="bold", **right)
 
 
-def between(found: dict[tuple[str, float, str], Cost], walk: str, other: str, factor: str) -> tuple[float, float]:
+def between(costs: dict[tuple[str, float, str], Cost], walk: str, other: str, factor: str) -> tuple[float, float]:
     """The least and the greatest, over the places, of `over` of two walks."""
-    ratios = [over(found[*place, walk], found[*place, other], factor) for place in PLACES]
+    ratios = [over(costs[*place, walk], costs[*place, other], factor) for place in PLACES]
     return min(ratios), max(ratios)
 
 
-def _title(found: dict[tuple[str, float, str], Cost]) -> str:
-    slower = [100 * r - 100 for r in between(found, "continuous", "albedo", "ns_per_event")]
-    faster = between(found, "capped", "bake nu", "ms_to_1_percent")
+def _title(costs: dict[tuple[str, float, str], Cost]) -> str:
+    slower = [100 * r - 100 for r in between(costs, "continuous", "albedo", "ns_per_event")]
+    faster = between(costs, "capped", "bake nu", "ms_to_1_percent")
     return (
         f"Exp absorption: {slower[0]:+.0f} to {slower[1]:+.0f} % time per event over albedo. "
         f"Drawn lives: {faster[0]:.1f} to {faster[1]:.1f} times as fast as capped ones"
     )
 
 
-def _row(found: dict[tuple[str, float, str], Cost], case: tuple[str, float, str]) -> dict:
-    (name, nm, walk), cost = case, found[case]
+def _row(costs: dict[tuple[str, float, str], Cost], case: tuple[str, float, str]) -> dict:
+    (name, nm, walk), cost = case, costs[case]
     spread = {}
     for k, factor in enumerate(FACTORS):
         values = cost.factors[:, k]
@@ -229,18 +228,18 @@ def _row(found: dict[tuple[str, float, str], Cost], case: tuple[str, float, str]
         "preset": name, "wavelength_nm": nm, "walk": walk, "rounds": len(cost.factors), "photons_a_round": cost.photons,
         **spread, "reflectance": cost.mean, "std_error": cost.std_error, "exact": cost.exact, "relative_bias":
         cost.bias[0], "sigmas_off": (cost.mean - cost.exact) / cost.std_error,
-        "ns_per_event_over_albedo": over(cost, found[name, nm, "albedo"], "ns_per_event"),
-        "ms_to_1_percent_over_capped": over(cost, found[name, nm, "capped"], "ms_to_1_percent"),
+        "ns_per_event_over_albedo": over(cost, costs[name, nm, "albedo"], "ns_per_event"),
+        "ms_to_1_percent_over_capped": over(cost, costs[name, nm, "capped"], "ms_to_1_percent"),
     }  # fmt: skip
 
 
-def _told(found: dict[tuple[str, float, str], Cost]) -> str:
+def _told(costs: dict[tuple[str, float, str], Cost]) -> str:
     per_event = []
     for walk in ("continuous", "mixed"):
-        low, high = between(found, walk, "albedo", "ns_per_event")
+        low, high = between(costs, walk, "albedo", "ns_per_event")
         per_event.append(f"{walk} {100 * low - 100:+.0f} to {100 * high - 100:+.0f} %")
-    bake, own = (between(found, "capped", walk, "ms_to_1_percent") for walk in ("bake nu", "own nu"))
-    bias = max(found[*place, "mixed"].bias[0] for place in PLACES)
+    bake, own = (between(costs, "capped", walk, "ms_to_1_percent") for walk in ("bake nu", "own nu"))
+    bias = max(costs[*place, "mixed"].bias[0] for place in PLACES)
     return (
         f"time per event over albedo {', '.join(per_event)}; mixed biased up to {100 * bias:+.1f} %; drawn lives reach "
         f"1 % {bake[0]:.2f} to {bake[1]:.2f} times as fast as lives of 9/ν ({own[0]:.2f} to {own[1]:.2f} with ν of the "

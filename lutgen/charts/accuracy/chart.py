@@ -9,7 +9,7 @@ from lutgen.charts import drawing
 from lutgen.charts.accuracy import absorption, profile_shapes, settings, speed, viewer_against_render, viewer_scattering
 
 
-def draw(out: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> dict[str, str]:
+def draw(out: Path, quick: bool = False, progress: Callable = drawing.silent) -> dict[str, str]:
     """Draw every chart into the folder `out`, which appears whole or not at all; what each shows, by its name.
 
     `quick` takes fewer photons, seeds and skins. Raises InputError where `out` holds something, MachineError without

@@ -15,6 +15,7 @@ import numpy as np
 
 from lutgen import color
 from lutgen import device as ocl
+from lutgen.charts.drawing import silent
 from lutgen.charts.stability.error_maps import mixed_layer
 from lutgen.skin import chromophores, tissue
 from lutgen.solvers import adding_doubling, dipole, direct, exact_totals, multipole, path_table, profiles
@@ -103,8 +104,8 @@ def judge(acescg: np.ndarray, panel: Jury) -> tuple[float, float]:
     """ΔE00, p95 and largest, of a LUT's colors [N, 3] at a jury's nodes, interpolated at its skins."""
     cells = np.zeros((*GRID.shape, 3))
     cells.reshape(-1, 3)[panel.nodes] = acescg
-    found = color.lab(color.from_acescg(GRID.interpolate(cells, *panel.skins), "xyz"))
-    apart = color.delta_e00(found, panel.lab)
+    lab = color.lab(color.from_acescg(GRID.interpolate(cells, *panel.skins), "xyz"))
+    apart = color.delta_e00(lab, panel.lab)
     return float(np.percentile(apart, 95)), float(apart.max())
 
 
@@ -185,29 +186,29 @@ def _drawn(skin: tissue.Skin, nm: float, absorption: str, photons: int, seeds: I
     return direct.shares(layers, photons, next(seeds), absorption=absorption).diffuse
 
 
-def runs(quick: bool, progress: Callable = lambda stage, tally: None) -> list[Run]:
+def runs(quick: bool, progress: Callable = silent) -> list[Run]:
     """Every method at every setting; Monte Carlo over photons and seeds."""
     ocl.choose()
     everything, some = jury(), jury(4 if quick else 10)
     seeds = range(3 if quick else 5)
-    found = []
+    done = []
     for k, powers in (("8", range(10, 18 if quick else 23, 2)), ("6", range(12, 17 if quick else 21, 2))):
         progress(f"path table, {k} wavelengths", None)
         walked(2048, 0, k)  # builds the kernels
         for photons in (2**p for p in powers):
             name = f"path table, {k} wavelengths"
-            found += [_run(name, partial(walked, photons, s, k), everything, photons, s, True) for s in seeds]
+            done += [_run(name, partial(walked, photons, s, k), everything, photons, s, True) for s in seeds]
     progress("anchored, adding-doubling", None)
-    found.append(_run("path table, anchored", partial(walked, 65_536, 0, "8", True), everything, 65_536, 0, True))
+    done.append(_run("path table, anchored", partial(walked, 65_536, 0, "8", True), everything, 65_536, 0, True))
     for wavelengths in ("8",) if quick else ("8", "5nm"):
         rule = "8 wavelengths" if wavelengths == "8" else "every 5 nm"
-        found.append(_run(f"adding-doubling, factored, {rule}", partial(factored, wavelengths), everything))
-    found.append(_run("exact totals table, every 5 nm", partial(tabled, "5nm"), everything))
-    found.append(_run("adding-doubling, node by node", partial(one_by_one, _stacked, some), some))
+        done.append(_run(f"adding-doubling, factored, {rule}", partial(factored, wavelengths), everything))
+    done.append(_run("exact totals table, every 5 nm", partial(tabled, "5nm"), everything))
+    done.append(_run("adding-doubling, node by node", partial(one_by_one, _stacked, some), some))
     for method, solve in (("dipole", _one_layer), ("multipole", _two_layers)):
         progress(method, None)
         panel = some if quick else everything
-        found.append(_run(method, partial(one_by_one, solve, panel), panel))
+        done.append(_run(method, partial(one_by_one, solve, panel), panel))
     for absorption in direct.ABSORPTION:
         progress(f"direct, {absorption}", None)
         direct.shares(tissue.layers(tissue.preset("light"), 550.0), 512, absorption=absorption)
@@ -215,21 +216,21 @@ def runs(quick: bool, progress: Callable = lambda stage, tally: None) -> list[Ru
             for seed in seeds:
                 count = iter(range(seed * 10**6, (seed + 1) * 10**6))  # no two nodes share their random numbers
                 solve = partial(_drawn, absorption=absorption, photons=photons, seeds=count)
-                found.append(_run(f"direct, {absorption}", partial(one_by_one, solve, some), some, photons, seed))
-    return found
+                done.append(_run(f"direct, {absorption}", partial(one_by_one, solve, some), some, photons, seed))
+    return done
 
 
 def floors(quick: bool) -> dict[str, tuple[float, float]]:
     """ΔE00 (p95, largest) at which Monte Carlo curves end however many photons: what else errs, computed exactly."""
     everything, some = jury(), jury(4 if quick else 10)
-    at = {"interpolation between nodes": judge(tabled("5nm"), everything)}
+    ends = {"interpolation between nodes": judge(tabled("5nm"), everything)}
     for name in ("6", "8"):
         rule = quadrature.load(name)
-        found = color.lab(_spectra(everything.skins, rule.wavelength_nm) @ rule.xyz_weights)
-        apart = color.delta_e00(found, everything.lab)
-        at[f"quadrature of {name} wavelengths"] = float(np.percentile(apart, 95)), float(apart.max())
-    at["bias of mixed absorption"] = judge(one_by_one(_as_mixed, some), some)
-    return at
+        lab = color.lab(_spectra(everything.skins, rule.wavelength_nm) @ rule.xyz_weights)
+        apart = color.delta_e00(lab, everything.lab)
+        ends[f"quadrature of {name} wavelengths"] = float(np.percentile(apart, 95)), float(apart.max())
+    ends["bias of mixed absorption"] = judge(one_by_one(_as_mixed, some), some)
+    return ends
 
 
 def pareto(points: list[tuple[float, float]]) -> list[int]:

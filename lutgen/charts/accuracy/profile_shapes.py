@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ import lutgen
 from lutgen import device as ocl
 from lutgen.charts import drawing
 from lutgen.charts.document.spectra import percent, shades, spectra
-from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
+from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches, leader, note, write
 from lutgen.charts.stability.error_maps import MIXED_DEPTH_MM, mixed_layer
 from lutgen.skin.tissue import PRESETS, Layer, Skin, layers
 from lutgen.solvers import burley, dipole, direct, multipole, path_table, profiles
@@ -43,7 +43,6 @@ _LOOKS = {
     LUT: (HUES[0], "*"), BEST: (HUES[1], "^"), MEAN: (HUES[1], "v"), ONE: (HUES[1], "s"), TABLE: (HUES[3], "D"),
     DIPOLE: (HUES[4], "o"), MULTIPOLE: (HUES[4], "s"), WALKS: (HUES[2], "o"), DIRECT: (INK, "X"),
 }  # fmt: skip
-_WIDE, _HIGH = 13.4, 9.4
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def rings_to_rgb(energy: np.ndarray, rule: wavelengths.Quadrature) -> np.ndarray
     return np.swapaxes(expand.normalized(mixed)[0], -1, -2)
 
 
-def truth(photons: int, progress: Callable = lambda stage, tally: None) -> tuple[np.ndarray, np.ndarray, float]:
+def truth(photons: int, progress: Callable = drawing.silent) -> tuple[np.ndarray, np.ndarray, float]:
     """Converged ring energies [T, 3, B] of the tones, noise [T, 3] as an EE difference, and the seconds of the trace.
 
     The mean of two traces of `photons` per wavelength each; half their difference is what the mean may be off by.
@@ -114,13 +113,12 @@ def walk(method: str, skin: Skin, photons: int, seed: int) -> np.ndarray:
 def _answers(skin: Skin, shape: np.ndarray, light: np.ndarray, lut: lutgen.LutSet) -> dict[str, Callable]:
     """How each contender that traces nothing finds encircled energy [3, B + 1]; shapes [3, B] of the skin and LIGHT."""
     cells, nodes = lut.profile_lut.shape, lut.profile_lut.grid
-    at = skin.melanin, skin.eumelanin, skin.hemoglobin
-    at_light = PRESETS[LIGHT]
-    table = nodes.interpolate(cells, at_light.melanin, at_light.eumelanin, at_light.hemoglobin).T
+    shares, lightest = ((s.melanin, s.eumelanin, s.hemoglobin) for s in (skin, PRESETS[LIGHT]))
+    table = nodes.interpolate(cells, *lightest).T
     fitted = (BEST, burley.fit, shape), (MEAN, burley.by_mean_radius, shape), (ONE, burley.fit, light)
-    d_mm = {name: fit(given.T, _EDGES)[0][:, None] for name, fit, given in fitted}
+    d_mm = {name: fit(energy.T, _EDGES)[0][:, None] for name, fit, energy in fitted}
     return {
-        LUT: lambda: profiles.encircled(nodes.interpolate(cells, *at).T),
+        LUT: lambda: profiles.encircled(nodes.interpolate(cells, *shares).T),
         **{name: lambda d=d: burley.encircled(_EDGES, d) for name, d in d_mm.items()},
         TABLE: lambda: profiles.encircled(table),
         DIPOLE: lambda: spectral(skin, lambda _, nm: dipole.profile([mixed_layer(skin, nm)], _EDGES, unsafe=True)),
@@ -130,15 +128,15 @@ def _answers(skin: Skin, shape: np.ndarray, light: np.ndarray, lut: lutgen.LutSe
 
 def _timed(answer: Callable) -> tuple[np.ndarray, float]:
     """An answer and its time in seconds: the median of 101 repeats, or of as many as begin within 30 ms."""
-    found, taken, begun = np.empty(0), [], time.perf_counter()
+    answered, taken, begun = np.empty(0), [], time.perf_counter()
     while not taken or (len(taken) < _REPEATS and time.perf_counter() - begun < _REPEATED_S):
         since = time.perf_counter()
-        found = answer()
+        answered = answer()
         taken.append(time.perf_counter() - since)
-    return found, float(np.median(taken))
+    return answered, float(np.median(taken))
 
 
-def contest(quick: bool = False, progress: Callable = lambda stage, tally: None) -> list[Row]:
+def contest(quick: bool = False, progress: Callable = drawing.silent) -> list[Row]:
     """Every contender on every tone, tone by tone from light to dark; `quick`: fewer photons."""
     progress("profiles: truth", None)
     shapes_of, noise, traced_s = truth(_TRUTH_PHOTONS[quick], progress)
@@ -150,20 +148,20 @@ def contest(quick: bool = False, progress: Callable = lambda stage, tally: None)
         skin, shape = PRESETS[tone], shapes_of[i]
         rows.append(_row(tone, NOISE, noise[i], traced_s, _TRUTH_PHOTONS[quick], TRUTH_SEEDS[-1]))
         for name, answer in _answers(skin, shape, shapes_of[0], lut).items():
-            found, seconds = _timed(answer)
-            rows.append(_row(tone, name, profiles.ee_difference(np.diff(found), shape, _EDGES), seconds))
+            within, seconds = _timed(answer)
+            rows.append(_row(tone, name, profiles.ee_difference(np.diff(within), shape, _EDGES), seconds))
         for method, budget in ((WALKS, _WALK_PHOTONS[quick]), (DIRECT, _DIRECT_PHOTONS[quick])):
             for photons in budget:
                 for seed in SEEDS:
                     since = time.perf_counter()
-                    found = walk(method, skin, photons, seed)
+                    within = walk(method, skin, photons, seed)
                     seconds = time.perf_counter() - since
-                    difference = profiles.ee_difference(np.diff(found), shape, _EDGES)
+                    difference = profiles.ee_difference(np.diff(within), shape, _EDGES)
                     rows.append(_row(tone, method, difference, seconds, photons, seed))
     return rows
 
 
-def shapes(folder: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> str:
+def shapes(folder: Path, quick: bool = False, progress: Callable = drawing.silent) -> str:
     """The chart `profiles`: EE difference against cost, a panel per tone; its main figures in words."""
     rows = contest(quick, progress)
     draw(folder, rows, ocl.choose().name)
@@ -172,13 +170,13 @@ def shapes(folder: Path, quick: bool = False, progress: Callable = lambda stage,
 
 def words(rows: list[Row]) -> str:
     """The main figures of a contest in a line."""
-    at = {(row.tone, row.contender): row for row in rows}
-    one, spread = at["dark", ONE], [[at[tone, name].ee_worst for tone in TONES] for name in (LUT, BEST)]
+    last = {(row.tone, row.contender): row for row in rows}
+    burley, spread = last["dark", ONE], [[last[tone, name].ee_worst for tone in TONES] for name in (LUT, BEST)]
     shown = ", ".join(f"{name} {min(v):.2g} to {max(v):.2g}" for name, v in zip((LUT, BEST), spread, strict=True))
     return (
         f"EE difference over six tones: {shown}; one Burley fitted to very light skin, on dark skin "
-        f"{one.ee_red:.2f} {one.ee_green:.2f} {one.ee_blue:.2f} (R G B); the LUT answers in "
-        f"{1e6 * at['dark', LUT].seconds:.0f} us"
+        f"{burley.ee_red:.2f} {burley.ee_green:.2f} {burley.ee_blue:.2f} (R G B); the LUT answers in "
+        f"{1e6 * last['dark', LUT].seconds:.0f} us"
     )
 
 
@@ -195,19 +193,18 @@ def draw(folder: Path, rows: list[Row], device: str) -> None:
         f"(dipole: skin averaged over {MIXED_DEPTH_MM:g} mm)."
     )
     title = "Profile error against cost on six skin tones: one light profile used on every tone fails on dark skin"
-    with drawing.figure(_WIDE, _HIGH, title, notes) as drawn:
+    with drawing.figure(folder, "profiles", rows, (13.4, 9.4), title, notes) as drawn:
         for i, tone in enumerate(TONES):
             left, top = 0.95 + 4.14 * (i % 3), 1.85 + 3.8 * (i // 3)
             skin = PRESETS[tone]
             drawing.strip(inches(drawn, left, top - 0.33, 0.36, 0.24), shades(spectra([skin]))[0])
             heading = f"{tone}, melanin {percent(skin.melanin)}"
-            drawn.text((left + 0.44) / _WIDE, 1 - (top - 0.21) / _HIGH, heading, size=10.5, va="center")
+            write(drawn, left + 0.44, top - 0.21, heading, size=10.5, va="center")
             axes = inches(drawn, left, top, 3.85, 2.95)
             _panel(axes, [row for row in rows if row.tone == tone])
             axes.set_xlabel("cost: seconds per profile" if i > 2 else "")
             axes.set_ylabel("" if i % 3 else "EE difference")
             axes.tick_params(labelleft=i % 3 == 0)
-        drawing.save(drawn, folder, "profiles", [asdict(row) for row in rows])
 
 
 def _panel(axes, rows: list[Row]) -> None:
@@ -218,28 +215,26 @@ def _panel(axes, rows: list[Row]) -> None:
     axes.minorticks_off()
     axes.grid(axis="y")
     axes.set_axisbelow(True)
-    found = {row.contender: row for row in rows if not row.seed}
+    single = {row.contender: row for row in rows if not row.seed}
     noise = next(row.ee_worst for row in rows if row.contender == NOISE)
     axes.axhspan(1e-4, noise, color=drawing.RULE, linewidth=0)
-    axes.annotate(f"{NOISE} {_short(noise)}", (4e-6, noise), (3, -3), textcoords="offset points", size=8, color=GRAY,
-                  va="top")  # fmt: skip
-    for name, row in found.items():
+    note(axes, f"{NOISE} {_short(noise)}", (4e-6, noise), (3, -3), size=8, color=GRAY, va="top")
+    for name, row in single.items():
         hue, marker = _LOOKS[name]
         size = 11 if name == LUT else 6.5
         axes.plot(row.seconds, row.ee_worst, marker, color=hue, markersize=size, clip_on=False,
                   markerfacecolor="white" if row.unsafe else hue)  # fmt: skip
     for name, offset, align in ((LUT, (8, 0), "left"), (DIPOLE, (8, 0), "left"), (MULTIPOLE, (0, 8), "center")):
-        row, placed = found[name], {"ha": align, "va": "baseline" if offset[1] else "center"}
-        axes.annotate(_told(row), (row.seconds, row.ee_worst), offset, textcoords="offset points", size=8,
-                      color=_LOOKS[name][0], **placed)  # fmt: skip
-    stored = [found[name] for name in (BEST, MEAN, ONE, TABLE)]
+        row, placed = single[name], {"ha": align, "va": "baseline" if offset[1] else "center"}
+        note(axes, _told(row), (row.seconds, row.ee_worst), offset, size=8, color=_LOOKS[name][0], **placed)
+    stored = [single[name] for name in (BEST, MEAN, ONE, TABLE)]
     places = drawing.apart([np.log10(row.ee_worst) for row in stored], 0.17)
     beside = 1.7 * max(row.seconds for row in stored)
-    star = np.log10(found[LUT].ee_worst)
+    star = np.log10(single[LUT].ee_worst)
     for row, place in zip(stored, np.where(abs(places - star) < 0.1, star - 0.22, places), strict=True):
-        line = {"arrowstyle": "-", "color": _LOOKS[row.contender][0], "linewidth": 0.7, "shrinkA": 0, "shrinkB": 4}
-        axes.annotate("", (row.seconds, row.ee_worst), (beside, 10**place), arrowprops=line)
-        axes.text(1.05 * beside, 10**place, _told(row), color=_LOOKS[row.contender][0], size=8, va="center")
+        hue, _ = _LOOKS[row.contender]
+        axes.annotate("", (row.seconds, row.ee_worst), (beside, 10**place), arrowprops=leader(hue))
+        axes.text(1.05 * beside, 10**place, _told(row), color=hue, size=8, va="center")
     for method, dash in ((WALKS, DASHES[0]), (DIRECT, DASHES[1])):
         _curve(axes, [row for row in rows if row.contender == method], dash)
 
@@ -254,10 +249,10 @@ def _curve(axes, rows: list[Row], dash) -> None:
     axes.plot(x, y, color=hue, linestyle=dash, marker=marker, markersize=5, clip_on=False)
     told = f"{rows[0].contender}\n{_thousands(budgets[0])} to {_thousands(budgets[-1])}"
     right = rows[0].contender == DIRECT
-    axes.annotate(told, (x[0], y[0]), (8, 6) if right else (-6, -7), textcoords="offset points", size=8, color=hue,
-                  ha="left" if right else "right", va="bottom" if right else "top")  # fmt: skip
-    for at, group in zip(x, of, strict=True):
-        axes.plot([at, at], [f(row.ee_worst for row in group) for f in (min, max)], color=hue, linewidth=0.9)
+    placed = {"ha": "left", "va": "bottom"} if right else {"ha": "right", "va": "top"}
+    note(axes, told, (x[0], y[0]), (8, 6) if right else (-6, -7), size=8, color=hue, **placed)
+    for seconds, group in zip(x, of, strict=True):
+        axes.plot([seconds] * 2, [f(row.ee_worst for row in group) for f in (min, max)], color=hue, linewidth=0.9)
 
 
 def _thousands(photons: int) -> str:

@@ -16,11 +16,11 @@ import lutgen
 from lutgen import color
 from lutgen.charts import drawing
 from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
+from lutgen.planning import stored_paths
 from lutgen.solvers import exact_totals, profiles
-from lutgen.solvers.paths import PathTable, interpolation_matrix
+from lutgen.solvers.paths import PathTable
 from lutgen.tables import bake, expand
 from lutgen.tables import recipe as recipes
-from lutgen.tables import wavelengths as quadrature
 from lutgen.tables.axes import Grid, default_grid
 
 TISSUE = recipes.Recipe().skin
@@ -70,27 +70,10 @@ def traced_paths(photons: int, seed: int) -> PathTable:
     return bake.paths_at_every_wavelength(photons, _EDGES, seed, TISSUE, count=TRACE_WAVELENGTHS)
 
 
-def at(paths: PathTable, rule: str) -> PathTable:
-    """Paths at a quadrature rule's wavelengths, interpolated from paths at Chebyshev wavelengths that share nodes.
-
-    Scattering is smooth in wavelength, so few stand for all. Traced apart, every wavelength would have noise of its
-    own, and rules would differ by that.
-    """
-    nm = quadrature.load(rule).wavelength_nm
-    shared = paths.nu_per_mm, paths.mu_epidermis, paths.mu_dermis
-    nu, mu_e, mu_d = (np.repeat(values[:1], len(nm), axis=0) for values in shared)
-    energy = np.tensordot(interpolation_matrix(paths.wavelength_nm, nm), paths.energy, axes=1)
-    return replace(paths, wavelength_nm=nm, nu_per_mm=nu, mu_epidermis=mu_e, mu_dermis=mu_d, energy=energy)
-
-
 def acescg(table: PathTable, weights: np.ndarray, skins) -> np.ndarray:
     """ACEScg energy [P, 3, B] of skins (chromophore arrays [P]), from paths at K wavelengths of weights [K, 3]."""
     mu = expand.coefficients(table.wavelength_nm, _absorbers(table), *skins)
     return np.einsum("kbp,kc->pcb", table.evaluate(*mu), weights, optimize=True)
-
-
-def _weights(rule: str) -> np.ndarray:
-    return expand.rgb_weights(quadrature.load(rule).xyz_weights)
 
 
 def _absorbers(paths: PathTable) -> expand.Absorbers:
@@ -112,25 +95,28 @@ def _errors(kind: str, errors: np.ndarray) -> dict[str, float]:
 def profile_errors(photons: int, skins) -> tuple[np.ndarray, np.ndarray]:
     """EE differences [R, P] of the RULES to every 5 nm, and their noise [R, P]; the largest of the ACEScg channels.
 
-    Both sums of a difference read the same paths. The difference is the mean of those of two traces; half of what
-    these two differ by is its noise.
+    Both sums of a difference read the same paths: traced apart, every wavelength would have noise of its own, and
+    rules would differ by that. The difference is the mean of those of two traces; half of what these two differ by is
+    its noise.
     """
     apart = []
     for paths in (traced_paths(photons, seed) for seed in TRACE_SEEDS):
-        *within, reference = (profiles.encircled(np.maximum(acescg(at(paths, r), _weights(r), skins), 0)) for r in _ALL)
+        shapes = (np.maximum(acescg(*stored_paths.at_rule(paths, rule), skins), 0) for rule in _ALL)
+        *within, reference = map(profiles.encircled, shapes)
         apart.append((np.array(within) - reference)[..., _EDGES >= profiles.COMPARED_FROM_MM])
-    one, other = apart
-    return np.abs(one + other).max(axis=(-1, -2)) / 2, np.abs(one - other).max(axis=(-1, -2)) / 2
+    first, second = apart
+    return np.abs(first + second).max(axis=(-1, -2)) / 2, np.abs(first - second).max(axis=(-1, -2)) / 2
 
 
 def wavelengths(folder: Path, exact: PathTable, quick: bool = False) -> str:
     """The chart `wavelengths`: color and profile error of each quadrature rule; its main figures in words."""
-    found, noise = profile_errors(PHOTONS[quick], _skins(PROFILES[quick]))
-    *colors, truth = (acescg(at(exact, rule), _weights(rule), _skins(SKINS[quick]))[..., 0] for rule in _ALL)
-    K = [len(_weights(rule)) for rule in RULES]
+    off, noise = profile_errors(PHOTONS[quick], _skins(PROFILES[quick]))
+    tables = {rule: stored_paths.at_rule(exact, rule) for rule in _ALL}
+    *colors, truth = (acescg(*table, _skins(SKINS[quick]))[..., 0] for table in tables.values())
+    K = [len(tables[rule][1]) for rule in RULES]
     rows = [
         {"rule": rule, "wavelengths": K[i]} | _errors("delta_e00", _difference(colors[i], truth))
-        | _errors("ee_difference", found[i]) | _errors("ee_noise", noise[i])
+        | _errors("ee_difference", off[i]) | _errors("ee_noise", noise[i])
         for i, rule in enumerate(RULES)
     ]  # fmt: skip
     notes = (
@@ -139,24 +125,24 @@ def wavelengths(folder: Path, exact: PathTable, quick: bool = False) -> str:
         f"both sums read the same paths, {PHOTONS[quick]} photons at each of {TRACE_WAVELENGTHS}\nwavelengths, "
         "interpolated in wavelength. Mean of two traces; noise: half of what they differ by. p95, max: over the skins."
     )
-    with drawing.figure(11.8, 5.0, "12 fitted wavelengths do the work of a regular grid of 41", notes) as drawn:
+    title = "12 fitted wavelengths do the work of a regular grid of 41"
+    with drawing.figure(folder, "wavelengths", rows, (11.8, 5.0), title, notes) as drawn:
         panels = ("delta_e00", "color difference ΔE00", (1e-3, 0.3)), ("ee_difference", "EE difference", (1e-6, 0.02))
         for i, (kind, label, ends) in enumerate(panels):
             axes = inches(drawn, 0.9 + 5.8 * i, 1.3, 3.5, 3.1)
             axes.set(xscale="log", xlim=(5, 46), xlabel="wavelengths traced")
             axes.set_xticks(K, [str(count) for count in K])
             _decades(axes, label, ends)
-            for part, words, hue in ((slice(3), "fitted", HUES[0]), (slice(3, None), "every 10 nm", HUES[1])):
+            for rules, words, hue in ((slice(3), "fitted", HUES[0]), (slice(3, None), "every 10 nm", HUES[1])):
                 labels = []
                 for which, dash, fill in (("p95", DASHES[0], hue), ("max", DASHES[1], "white")):
-                    y = [row[f"{kind}_{which}"] for row in rows[part]]
-                    axes.plot(K[part], y, color=hue, linestyle=dash, marker="o", markerfacecolor=fill)
+                    y = [row[f"{kind}_{which}"] for row in rows[rules]]
+                    axes.plot(K[rules], y, color=hue, linestyle=dash, marker="o", markerfacecolor=fill)
                     labels.append((y[-1], f"{words}, {which}", hue))
                 if (kind, words) == ("ee_difference", "every 10 nm"):
                     axes.plot(K, noise.max(axis=1), color=GRAY, linestyle=DASHES[2], linewidth=1.1)
                     labels.append((noise[3].max(), "noise, max", GRAY))
-                drawing.label_ends(axes, K[part][-1], labels, 0.13 + 0.12 * i)
-        drawing.save(drawn, folder, "wavelengths", rows)
+                drawing.label_ends(axes, K[rules][-1], labels, 0.13 + 0.12 * i)
     told = (f"{r['wavelengths']} ΔE00 {r['delta_e00_p95']:.2g} EE {r['ee_difference_p95']:.2g}" for r in rows)
     return f"wavelengths (p95) {', '.join(told)}"
 
@@ -179,9 +165,9 @@ def table_rows(sizes: tuple, skins, kind: str, cells: Callable, errors: Callable
             exact = cells(nodes)
             for stored, number in STORED.items():
                 kept = exact.astype(number)
-                found = nodes.interpolate(kept.astype(float), *skins)
+                between = nodes.interpolate(kept.astype(float), *skins)
                 row = {"part": "table", "spacing": name, "nodes": "×".join(map(str, size)), "stored": stored}
-                rows.append(row | {"bytes": kept.nbytes} | _errors(kind, errors(found)))
+                rows.append(row | {"bytes": kept.nbytes} | _errors(kind, errors(between)))
     return rows
 
 
@@ -202,27 +188,27 @@ def _by_bytes(drawn, rows: list[dict], kind: str, label: str, ends: tuple[float,
             if name == CUBE_ROOT:
                 x, y = [row["bytes"] for row in halves], [row[f"{kind}_{which}"] for row in halves]
                 axes.plot(x, y, "o", color=hue, linestyle=DASHES[2], linewidth=1.1, markerfacecolor="white")
-                for at_x, at_y, row in zip(x, y, halves, strict=True):
-                    axes.text(at_x / 1.13, at_y / 1.1, row["nodes"], color=hue, size=8, ha="right", va="top")
+                for size, error, row in zip(x, y, halves, strict=True):
+                    axes.text(size / 1.13, error / 1.1, row["nodes"], color=hue, size=8, ha="right", va="top")
         drawing.label_ends(axes, largest, labels, 0.14)
 
 
 def color_axes(folder: Path, exact: PathTable, quick: bool = False) -> str:
     """The chart `axes`: color error by spacing, node counts and bytes of a table; its main figures in words."""
-    skins, table, weights = _skins(SKINS[quick]), at(exact, REFERENCE), _weights(REFERENCE)
+    skins, (table, weights) = _skins(SKINS[quick]), stored_paths.at_rule(exact, REFERENCE)
     truth = acescg(table, weights, skins)[..., 0]
     rows = table_rows(
         COLOR_SIZES, skins, "delta_e00",
         lambda nodes: expand.color_cells(table, nodes, _absorbers(table), weights),
-        lambda found: _difference(found, truth),
+        lambda colors: _difference(colors, truth),
     )  # fmt: skip
     notes = (
         f"Exact ACEScg colors interpolated between nodes, against exact colors of {SKINS[quick]} random skins "
         f"(log-uniform melanin and hemoglobin).\n{_TABLES}"
     )
-    with drawing.figure(11.8, 5.6, "Color tables: cube-root axes err least at every size", notes) as drawn:
+    title = "Color tables: cube-root axes err least at every size"
+    with drawing.figure(folder, "axes", rows, (11.8, 5.6), title, notes) as drawn:
         _by_bytes(drawn, rows, "delta_e00", "color difference ΔE00", (0.012, 14))
-        drawing.save(drawn, folder, "axes", rows)
     shown = [row for row in rows if (row["spacing"], row["nodes"]) == (CUBE_ROOT, "16×8×16")]
     return "16×8×16 colors ΔE00 " + ", ".join(f"{row['delta_e00_p95']:.3f} in {row['stored']}" for row in shown)
 
@@ -242,10 +228,10 @@ def roundings(shapes: np.ndarray) -> dict[str, np.ndarray]:
 
 def far_errors(shapes: np.ndarray, rounded: np.ndarray) -> np.ndarray:
     """Relative error [...] of the light beyond the last ring edge that a thousandth of the light [..., B] passes."""
-    beyond, found = (np.cumsum(s[..., ::-1], axis=-1)[..., ::-1] / s.sum(-1, keepdims=True) for s in (shapes, rounded))
-    last = (beyond >= FAR_SHARE).sum(axis=-1, keepdims=True) - 1
-    beyond, found = (np.take_along_axis(share, last, axis=-1)[..., 0] for share in (beyond, found))
-    return np.abs(found / beyond - 1)
+    shares = [np.cumsum(s[..., ::-1], axis=-1)[..., ::-1] / s.sum(-1, keepdims=True) for s in (shapes, rounded)]
+    last = (shares[0] >= FAR_SHARE).sum(axis=-1, keepdims=True) - 1
+    beyond, kept = (np.take_along_axis(share, last, axis=-1)[..., 0] for share in shares)
+    return np.abs(kept / beyond - 1)
 
 
 def profile_rows(quick: bool = False) -> list[dict]:
@@ -259,28 +245,28 @@ def profile_rows(quick: bool = False) -> list[dict]:
     rows = table_rows(
         PROFILE_SIZES, skins, "ee_difference",
         lambda nodes: expand.profile_cells(luts.paths, nodes, _absorbers(luts.paths), luts.weights)[0],
-        lambda found: profiles.ee_difference(truth, found.swapaxes(1, 2), _EDGES),
+        lambda shapes: profiles.ee_difference(truth, shapes.swapaxes(1, 2), _EDGES),
     )  # fmt: skip
-    rows = [row | {"far_error_p95": "", "far_error_max": ""} for row in rows]
     shapes = luts.profile_lut.shape.astype(float).swapaxes(-1, -2)
     nodes = "×".join(map(str, luts.profile_lut.grid.shape[::-1]))
-    for stored, found in roundings(shapes).items():
+    for stored, kept in roundings(shapes).items():
         row = {"part": "rounding", "spacing": CUBE_ROOT, "nodes": nodes, "stored": stored, "bytes": 2 * shapes.size}
-        row |= _errors("ee_difference", profiles.ee_difference(shapes, found, _EDGES))
-        rows.append(row | _errors("far_error", far_errors(shapes, found)))
+        row |= _errors("ee_difference", profiles.ee_difference(shapes, kept, _EDGES))
+        rows.append(row | _errors("far_error", far_errors(shapes, kept)))
     return rows
 
 
 def profile_axes(folder: Path, quick: bool = False) -> str:
     """The chart `profile-axes`: profile error by bytes of the table, and what half floats cost; figures in words."""
     rows = profile_rows(quick)
-    tables, rounding = ([row for row in rows if row["part"] == part] for part in ("table", "rounding"))
+    tables, rounding = ([row for row in rows if row["part"] == kind] for kind in ("table", "rounding"))
     notes = (
         f"Top: shapes of 64 rings × RGB interpolated between nodes against the paths they come from, {PROFILES[quick]} "
         f"random skins. EE: encircled energy at 0.01 mm and more.\n{_TABLES}\nBottom: the default set's profiles as "
         "half, kept in four ways; 95th percentile filled, maximum hollow."
     )
-    with drawing.figure(11.8, 8.1, "Profile tables: nodes matter, half floats of ring energies do not", notes) as drawn:
+    title = "Profile tables: nodes matter, half floats of ring energies do not"
+    with drawing.figure(folder, "profile-axes", rows, (11.8, 8.1), title, notes) as drawn:
         _by_bytes(drawn, tables, "ee_difference", "EE difference", (3e-4, 0.15))
         labels = {"ee_difference": "EE difference by rounding", "far_error": "error of the farthest 0.1 % of the light"}
         for i, (kind, label) in enumerate(labels.items()):
@@ -293,6 +279,5 @@ def profile_axes(folder: Path, quick: bool = False) -> str:
             axes.set_yticks(range(4), [""] * 4 if i else [row["stored"] for row in rounding])
             axes.minorticks_off()
             axes.grid(axis="x")
-        drawing.save(drawn, folder, "profile-axes", rows)
     lost = (f"{row['ee_difference_max']:.1g} as {row['stored']}" for row in rounding)
     return f"half profiles err by EE {', '.join(lost)}"

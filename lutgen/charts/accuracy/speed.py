@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from lutgen.charts import drawing
 from lutgen.charts.accuracy import methods
 from lutgen.charts.accuracy.methods import Run
-from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches
+from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, ground, inches, leader, note
 
 FRONT = "#c9c9c9"
 _HUE = {
@@ -22,10 +22,10 @@ _HUE = {
 
 def speed(folder: Path, quick: bool, progress: Callable) -> str:
     """Draw `speed-accuracy`: seconds of a whole LUT over ΔE00, p95 and largest, with its Pareto front and floors."""
-    found = methods.runs(quick, progress)
+    runs = methods.runs(quick, progress)
     floors = methods.floors(quick)
-    draw(folder, found, floors)
-    whole = [run for run in found if run.method == "path table, 8 wavelengths"]
+    draw(folder, runs, floors)
+    whole = [run for run in runs if run.method == "path table, 8 wavelengths"]
     best = min(whole, key=lambda run: run.delta_e00_p95)
     return (
         f"path table at 8 wavelengths from ΔE00 p95 {max(r.delta_e00_p95 for r in whole):.2f} in "
@@ -34,43 +34,40 @@ def speed(folder: Path, quick: bool, progress: Callable) -> str:
     )
 
 
-def draw(folder: Path, found: list[Run], floors: dict[str, tuple[float, float]]) -> None:
+def draw(folder: Path, runs: list[Run], floors: dict[str, tuple[float, float]]) -> None:
     """Two panels, p95 and largest ΔE00; filled: made whole, hollow: time scaled up from a share."""
-    with drawing.figure(
-        14.6, 7.6, "Speed against accuracy of a color LUT of 16 × 8 × 16 nodes, by method",
+    notes = (
         "Difference from adding-doubling at 5 nm at random skins, from the darkest to the lightest. Circles: color and "
         "profiles from one trace; squares: color only.\nFilled: the whole LUT was made. Hollow: some nodes were made, "
         "the time is scaled to all. Small points: single seeds; large: their median. Imports and kernel building are "
-        "not counted.",
-    ) as drawn:  # fmt: skip
+        "not counted."
+    )
+    title = "Speed against accuracy of a color LUT of 16 × 8 × 16 nodes, by method"
+    ends = [{"delta_e00_p95": p95, "delta_e00_max": top, "floor": name} for name, (p95, top) in floors.items()]
+    with drawing.figure(folder, "speed-accuracy", [*runs, *ends], (14.6, 7.6), title, notes) as drawn:
         for k, name in enumerate(("p95", "max")):
             axes = inches(drawn, 0.85 + 7.0 * k, 1.3, 5.1, 5.6)
             heading = ("19 of 20 skins are closer than this (p95)", "largest of all skins")[k]
-            _panel(axes, found, {floor: at[k] for floor, at in floors.items()}, f"delta_e00_{name}")
+            _panel(axes, runs, {floor: errors[k] for floor, errors in floors.items()}, f"delta_e00_{name}")
             axes.set_title(heading, color=INK)
-        rows = [asdict(run) | {"floor": ""} for run in found]
-        empty = dict.fromkeys(rows[0], "")
-        rows += [empty | {"delta_e00_p95": p95, "delta_e00_max": top, "floor": name}
-                 for name, (p95, top) in floors.items()]  # fmt: skip
-        drawing.save(drawn, folder, "speed-accuracy", rows)
 
 
-def _panel(axes, found: list[Run], floors: dict[str, float], error: str) -> None:
+def _panel(axes, runs: list[Run], floors: dict[str, float], error: str) -> None:
     axes.set(xscale="log", yscale="log", xlim=(0.005, 2e5), ylim=(0.012, 40))
     axes.set(xlabel="time for the whole LUT (two cores)", ylabel="color difference ΔE00")
     axes.set_xticks([0.01, 0.1, 1, 10, 60, 600, 3600], ["10 ms", "0.1 s", "1 s", "10 s", "1 min", "10 min", "1 h"])
     axes.set_yticks([0.1, 1, 10], ["0.1", "1", "10"])
     axes.grid(axis="y")
-    for floor, at in floors.items():
-        axes.axhline(at, color=GRAY, linestyle=(0, (1, 2)), linewidth=0.9, zorder=1)
-        axes.text(1.02, at, floor.replace(" of ", "\nof ", 1).replace(" between ", "\nbetween "), size=8, color=GRAY,
+    for floor, least in floors.items():
+        axes.axhline(least, color=GRAY, linestyle=(0, (1, 2)), linewidth=0.9, zorder=1)
+        axes.text(1.02, least, floor.replace(" of ", "\nof ", 1).replace(" between ", "\nbetween "), size=8, color=GRAY,
                   va="center", transform=axes.get_yaxis_transform(), linespacing=1.1)  # fmt: skip
-    medians = [_median(group) for group in _groups(found).values()]
+    medians = [_median(group) for group in _groups(runs).values()]
     whole = [(run.seconds, getattr(run, error)) for run in medians if run.share == 1]
     front = np.array([whole[i] for i in methods.pareto(whole)])
     axes.plot(*front.T, color=FRONT, linewidth=7, solid_capstyle="round", zorder=0)
-    axes.annotate("Pareto front of whole LUTs", front[-1], (14, 8), textcoords="offset points", color=GRAY, size=8.5)
-    for run in found:
+    note(axes, "Pareto front of whole LUTs", front[-1], (14, 8), color=GRAY, size=8.5)
+    for run in runs:
         if run.method in _HUE:
             axes.plot(run.seconds, getattr(run, error), ".", color=HUES[_HUE[run.method]], markersize=3, zorder=2)
     alone = []
@@ -83,10 +80,10 @@ def _panel(axes, found: list[Run], floors: dict[str, float], error: str) -> None
         axes.plot(x, y, linestyle=DASHES[_HUE.get(method, 0)], linewidth=1.3, **shape)
         if method.startswith("path table,") and method in _HUE:
             place = (-4, 34) if method == medians[0].method else (-10, -150)
-            leader = {"arrowstyle": "-", "color": hue, "linewidth": 0.6, "relpos": (0, 1 if place[1] < 0 else 0)}
+            arrow = {"arrowstyle": "-", "color": hue, "linewidth": 0.6, "relpos": (0, 1 if place[1] < 0 else 0)}
             words = f"{method},\n{line[0].photons:,} to {line[-1].photons:,}\nphotons each"
-            axes.annotate(words, (x[0], y[0]), place, textcoords="offset points", color=hue, size=9, arrowprops=leader,
-                          linespacing=1.05, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})  # fmt: skip
+            note(axes, words, (x[0], y[0]), place, color=hue, size=9, arrowprops=arrow, linespacing=1.05,
+                 bbox=ground(0.5))  # fmt: skip
         elif method not in _HUE:
             alone.append((x[0], y[0], method))
     walks = [run for run in medians if run.method.startswith("direct") and run.photons == medians[-1].photons]
@@ -100,10 +97,9 @@ def _panel(axes, found: list[Run], floors: dict[str, float], error: str) -> None
 def _name_points(axes, points: list[tuple[float, float, str]], drop: float) -> None:
     """Names below points on thin lines, the leftmost lowest, so that no line crosses a name; beside them without."""
     for k, (x, y, name) in enumerate(sorted(points, reverse=True)):
-        leader = {"arrowstyle": "-", "color": GRAY, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4, "relpos": (0, 1)}
+        line = leader(GRAY, 0.6, relpos=(0, 1)) if drop else None
         place = (0, -drop - 15 * k) if drop else (8, 0)
-        axes.annotate(name, (x, y), place, textcoords="offset points", size=8.5, color=INK,
-                      arrowprops=leader if drop else None, va="top" if drop else "center")  # fmt: skip
+        note(axes, name, (x, y), place, size=8.5, color=INK, arrowprops=line, va="top" if drop else "center")
 
 
 def _slope(axes, start: Run, error: str) -> None:
@@ -111,12 +107,12 @@ def _slope(axes, start: Run, error: str) -> None:
     x = np.array([start.seconds * 2.5, start.seconds * 20])
     y = getattr(start, error) * 1.3 * (x / x[0]) ** -0.5
     axes.plot(x, y, color=GRAY, linewidth=0.9)
-    axes.annotate("error ∝ 1/√photons", (x[0], y[0]), (6, -3), textcoords="offset points", size=8.5, color=GRAY)
+    note(axes, "error ∝ 1/√photons", (x[0], y[0]), (6, -3), size=8.5, color=GRAY)
 
 
-def _groups(found: list[Run]) -> dict[tuple[str, int], list[Run]]:
+def _groups(runs: list[Run]) -> dict[tuple[str, int], list[Run]]:
     groups: dict[tuple[str, int], list[Run]] = {}
-    for run in found:
+    for run in runs:
         groups.setdefault((run.method, run.photons), []).append(run)
     return groups
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,7 @@ QUICK = {"tiers": ("off", "medium", "high"), "side": 96, "samples": 32, "rounds"
 FULL = {"tiers": looks.TIERS, "side": 192, "samples": 128, "rounds": 3, "timed": (640, 360),
         "tones": {"portrait": ("very-light", "light", "intermediate", "tan", "brown", "dark"),
                   "close-up": ("very-light", "dark")}}  # fmt: skip
-_WIDE, _HIGH = 13.4, 6.3
+_SIZE = 13.4, 6.3
 _MARKS = "os"
 
 
@@ -49,7 +49,7 @@ class Row:
     lightness: float
 
 
-def truth(folder: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> str:
+def truth(folder: Path, quick: bool = False, progress: Callable = drawing.silent) -> str:
     """The chart `truth`; its main figures in words, or why it was left out: it needs OpenGL and the extra `view`."""
     extent = QUICK if quick else FULL
     if missing := viewer_tiers.missing():
@@ -60,34 +60,34 @@ def truth(folder: Path, quick: bool = False, progress: Callable = lambda stage, 
     return words(rows)
 
 
-def differences(costs: dict, extent: dict, progress: Callable = lambda stage, tally: None) -> list[Row]:
+def differences(costs: dict, extent: dict, progress: Callable = drawing.silent) -> list[Row]:
     """Every tier of `costs` in every view and tone, the built-in head."""
     app, stages, side = viewer.viewer("app"), viewer.viewer("stage"), extent["side"]
-    shape, given = subject.model(None, None, None)
+    shape, textures = subject.model(None, None, None)
     rows = []
-    opened = app.open_stage(lutgen.load(), shape, given, (side, side))
+    opened = app.open_stage(lutgen.load(), shape, textures, (side, side))
     try:
         for view, look in VIEWS.items():
             for tone in extent["tones"][view]:
                 progress(f"render: {view}, {tone}", None)
                 skin = looks.of_preset(tone, look)
-                true = rendered(shape, given, skin, side, extent["samples"])
+                true = rendered(shape, textures, skin, side, extent["samples"])
                 for tier, cost in costs.items():
-                    found = compare.compare(true, seen(opened, replace(skin, tier=tier)))
-                    rows.append(Row(view, tone, tier, cost.total, cost.ratio, found.mean.value, found.mean.sigma,
-                                    found.p95.value, found.noise_alone[2], found.lightness.value))  # fmt: skip
+                    off = compare.compare(true, seen(opened, replace(skin, tier=tier)))
+                    rows.append(Row(view, tone, tier, cost.total, cost.ratio, off.mean.value, off.mean.sigma,
+                                    off.p95.value, off.noise_alone[2], off.lightness.value))  # fmt: skip
     finally:
         stages.release(opened)
     return rows
 
 
-def rendered(shape, given, look: Look, side: int, samples: int, seed: int = 0) -> compare_files.Picture:
+def rendered(shape, textures, look: Look, side: int, samples: int, seed: int = 0) -> compare_files.Picture:
     """The scene traced by the flat walk, side x side pixels."""
-    opened = device_scene.open_stage(ocl.choose(), lutgen.load(), shape, given, look, (side, side), seed=seed)
+    opened = device_scene.open_stage(ocl.choose(), lutgen.load(), shape, textures, look, (side, side), seed=seed)
     walk = flat_walk.flat(opened, seed)
     start, goal = film.empty((side, side), walk.group, {}), progressive.Goal(samples=samples)
-    made, _, _ = progressive.render(opened, walk, start, goal, lambda made, noise: None)
-    return compare_files.Picture("render", made.rgb, made.covariance(), made.mask)
+    traced, _, _ = progressive.render(opened, walk, start, goal, lambda picture, noise: None)
+    return compare_files.Picture("render", traced.rgb, traced.covariance(), traced.mask)
 
 
 def seen(opened, look: Look) -> compare_files.Picture:
@@ -100,8 +100,8 @@ def seen(opened, look: Look) -> compare_files.Picture:
 
 def worst(rows: list[Row], view: str, tier: str) -> tuple[float, float]:
     """The largest mean and the largest p95 of all tones."""
-    found = [row for row in rows if (row.view, row.tier) == (view, tier)]
-    return max(row.mean for row in found), max(row.p95 for row in found)
+    tones = [row for row in rows if (row.view, row.tier) == (view, tier)]
+    return max(row.mean for row in tones), max(row.p95 for row in tones)
 
 
 def words(rows: list[Row]) -> str:
@@ -124,14 +124,11 @@ def draw(folder: Path, rows: list[Row], extent: dict) -> None:
         "compare`). Lines: worst tone; bands: all, close up the two extremes. "
         f"Cost: a frame of {width} × {height} over that of a plain head."
     )
-    with drawing.figure(
-        _WIDE, _HIGH, "How far the viewer is from a traced picture, and what a tier buys", notes
-    ) as drawn:
-        for k, (figure, title) in enumerate(
-            (("mean", "mean ΔE00 of boxes"), ("p95", "ΔE00 that 95 % of boxes are below"))
-        ):
-            _panel(inches(drawn, 0.85 + 6.75 * k, 1.75, 4.1, 3.95), rows, figure, title)
-        drawing.save(drawn, folder, "truth", [asdict(row) for row in rows])
+    title = "How far the viewer is from a traced picture, and what a tier buys"
+    panels = ("mean", "mean ΔE00 of boxes"), ("p95", "ΔE00 that 95 % of boxes are below")
+    with drawing.figure(folder, "truth", rows, _SIZE, title, notes) as drawn:
+        for k, (figure, heading) in enumerate(panels):
+            _panel(inches(drawn, 0.85 + 6.75 * k, 1.75, 4.1, 3.95), rows, figure, heading)
 
 
 def _panel(axes, rows: list[Row], figure: str, title: str) -> None:
@@ -143,10 +140,10 @@ def _panel(axes, rows: list[Row], figure: str, title: str) -> None:
     viewer_tiers.axis(axes, names, top, top * 1.035)
     labels, x = [], list(ratios.values())
     for k, view in enumerate(VIEWS):
-        found = np.array(
+        y = np.array(
             [[getattr(row, figure) for row in rows if (row.view, row.tier) == (view, tier)] for tier in ratios]
         )
-        axes.fill_between(x, found.min(axis=1), found.max(axis=1), color=HUES[k], alpha=0.12, linewidth=0)
-        axes.plot(x, found.max(axis=1), linestyle=DASHES[k], color=HUES[k], marker=_MARKS[k], markersize=5.5)
-        labels.append((float(found[-1].max()), f"{view}, {_MM_PER_PIXEL[view]:g} mm", HUES[k]))
+        axes.fill_between(x, y.min(axis=1), y.max(axis=1), color=HUES[k], alpha=0.12, linewidth=0)
+        axes.plot(x, y.max(axis=1), linestyle=DASHES[k], color=HUES[k], marker=_MARKS[k], markersize=5.5)
+        labels.append((float(y[-1].max()), f"{view}, {_MM_PER_PIXEL[view]:g} mm", HUES[k]))
     drawing.label_ends(axes, max(x), labels, 0.06 * top)

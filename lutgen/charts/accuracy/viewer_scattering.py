@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import lutgen
@@ -20,7 +20,7 @@ QUICK = {"tiers": ("off", "medium", "high"), "tones": ("very-light", "dark"), "p
          "size": (320, 180), "rounds": 2}  # fmt: skip
 FULL = {"tiers": looks.TIERS, "tones": ("very-light", "light", "intermediate", "tan", "brown", "dark"),
         "places": range(16), "size": (640, 360), "rounds": 5}  # fmt: skip
-_WIDE, _HIGH = 13.4, 6.3
+_SIZE = 13.4, 6.3
 _MARKS = "osD"
 
 
@@ -41,7 +41,7 @@ class Row:
     edge_rms: float
 
 
-def viewing(folder: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> str:
+def viewing(folder: Path, quick: bool = False, progress: Callable = drawing.silent) -> str:
     """The chart `viewing`; its main figures in words, or why it was left out: it needs OpenGL and the extra `view`."""
     extent = QUICK if quick else FULL
     if missing := viewer_tiers.missing():
@@ -52,7 +52,7 @@ def viewing(folder: Path, quick: bool = False, progress: Callable = lambda stage
     return words(rows)
 
 
-def errors(costs: list, extent: dict, progress: Callable = lambda stage, tally: None) -> list[Row]:
+def errors(costs: list, extent: dict, progress: Callable = drawing.silent) -> list[Row]:
     """Each tier's errors with the set's own profiles and with one Burley fitted to the lightest tone, LUT first."""
     gl, laws = viewer.viewer("gl"), viewer.viewer("measure.scattering_laws")
     plane = laws.open_plane(lutgen.load())
@@ -65,13 +65,13 @@ def errors(costs: list, extent: dict, progress: Callable = lambda stage, tally: 
                 if profile == BURLEY and cost.name in ("off", "reference"):
                     continue  # no profile is read, or 16 frames, which no engine adds up
                 progress(f"viewer: {cost.name}, {profile}", None)
-                found = {
+                of_tone = {
                     tone: [laws.searchlight(plane, tone, scale, cost.taps, cost.frames, places, tables)
                            for scale in SCALES] + [laws.edge_noise(plane, tone, cost.taps, cost.frames, tables=tables)]
                     for tone in extent["tones"]
                 }  # fmt: skip
-                worst = [max(values[k] for values in found.values()) for k in range(len(SCALES) + 1)]
-                tone = max(found, key=lambda name: found[name][0])
+                worst = [max(values[k] for values in of_tone.values()) for k in range(len(SCALES) + 1)]
+                tone = max(of_tone, key=lambda name: of_tone[name][0])
                 rows.append(Row(cost.name, profile, cost.taps, cost.frames, cost.total, cost.ratio, worst[0], worst[1],
                                 worst[2], tone, worst[3]))  # fmt: skip
     finally:
@@ -82,9 +82,9 @@ def errors(costs: list, extent: dict, progress: Callable = lambda stage, tally: 
 
 def words(rows: list[Row]) -> str:
     """The main figures of the chart in a line."""
-    at = {(row.tier, row.profile): row for row in rows}
+    by_tier = {(row.tier, row.profile): row for row in rows}
     each = ", ".join(f"{row.tier} {row.ratio:.2f} × EE {max(_ee(row)):.2g}" for row in rows if row.profile == LUT)
-    burley = max(_ee(at["high", BURLEY]))
+    burley = max(_ee(by_tier["high", BURLEY]))
     return f"frame over a plain head's, and worst EE difference: {each}; one Burley at high EE {burley:.2g}"
 
 
@@ -103,14 +103,13 @@ def draw(folder: Path, rows: list[Row], renderer: str, extent: dict) -> None:
         "taps added up; off: no taps."
     )
     title = "What scattering costs a frame, and how right it is: more taps do not mend a profile that is not the skin's"
-    with drawing.figure(_WIDE, _HIGH, title, notes) as drawn:
+    with drawing.figure(folder, "viewing", rows, _SIZE, title, notes) as drawn:
         curves = [(f"{scale:g} mm per pixel", lambda row, k=k: _ee(row)[k]) for k, scale in enumerate(SCALES)]
         left = inches(drawn, 0.85, 1.75, 4.1, 3.95)
         _panel(left, rows, curves, "EE difference of a disc of 6 pixels", (1.5e-3, 1.2))
         right = inches(drawn, 7.75, 1.75, 4.1, 3.95)
         alone = [(f"{SCALES[0]:g} mm per pixel", lambda row: row.edge_rms)]
         _panel(right, rows, alone, f"RMS error at a lit edge, {alone[0][0]}", (1.5e-3, 1.2))
-        drawing.save(drawn, folder, "viewing", [asdict(row) for row in rows])
 
 
 def _panel(axes, rows: list[Row], curves: list, title: str, ends: tuple[float, float]) -> None:

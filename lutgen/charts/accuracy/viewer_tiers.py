@@ -7,7 +7,7 @@ from math import log10
 
 import lutgen
 from lutgen.charts import drawing
-from lutgen.charts.drawing import GRAY
+from lutgen.charts.drawing import GRAY, leader
 from lutgen.errors import MachineError
 from lutgen.scene import subject, viewer
 from lutgen.scene.look import Look
@@ -28,10 +28,10 @@ def costs(size: tuple[int, int], tiers: tuple[str, ...], rounds: int, progress: 
     app, timing, stages = (viewer.viewer(name) for name in ("app", "measure.timing", "stage"))
     opened = app.open_stage(lutgen.load(), *subject.model(None, None, None), size)
     try:
-        _, found = timing.costs(opened, Look(), tiers, rounds=rounds, progress=lambda name: progress(name, None))
+        _, measured = timing.costs(opened, Look(), tiers, rounds=rounds, progress=lambda name: progress(name, None))
     finally:
         stages.release(opened)
-    return found
+    return measured
 
 
 def axis(axes, ratios: Mapping[str, float], top: float, above: float) -> None:
@@ -43,9 +43,8 @@ def axis(axes, ratios: Mapping[str, float], top: float, above: float) -> None:
     axes.xaxis.set_minor_formatter("")
     axes.grid(axis="y")
     axes.set_axisbelow(True)
-    line = {"arrowstyle": "-", "color": drawing.RULE, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     places = drawing.apart([log10(ratio) for ratio in ratios.values()], 0.13 * log10(most * 1.12))
     for (tier, ratio), place in zip(ratios.items(), places, strict=True):
         axes.axvline(ratio, color=drawing.RULE, linewidth=0.8, zorder=0)
         axes.annotate(tier, (ratio, top), (10**place, above), color=GRAY, size=8.5, ha="center", va="bottom",
-                      annotation_clip=False, arrowprops=line)  # fmt: skip
+                      annotation_clip=False, arrowprops=leader(drawing.RULE, 0.8, 0))  # fmt: skip

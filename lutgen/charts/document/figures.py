@@ -22,7 +22,7 @@ from lutgen.charts.document.spectra import (
     sweep,
     ticks,
 )
-from lutgen.charts.drawing import DASHES, GRAY, HUES, inches
+from lutgen.charts.drawing import DASHES, GRAY, HUES, inches, write
 from lutgen.skin.tissue import PRESETS, plain
 
 STEPS = 24
@@ -36,15 +36,14 @@ AXIS_NAMES = {
 
 
 def draw(
-    out: Path, steps: int = STEPS, size: tuple[int, int] = portraits.SIZE,
-    progress: Callable = lambda stage, tally: None,
-) -> dict[str, str]:  # fmt: skip
+    out: Path, steps: int = STEPS, size: tuple[int, int] = portraits.SIZE, progress: Callable = drawing.silent
+) -> dict[str, str]:
     """Draw every figure into the folder `out`, which appears whole or not at all; what each shows, by its name.
 
     `steps`: colors along a strip; `size`: pixels of a portrait. Raises InputError where `out` holds something,
     MachineError without matplotlib.
     """
-    stages = {f"sweep-{name}": lambda folder, name=name: sweep_figure(folder, name, steps) for name in SWEEPS} | {
+    charts = {f"sweep-{name}": lambda folder, name=name: sweep_figure(folder, name, steps) for name in SWEEPS} | {
         "skin-types": skin_types,
         "scattering-curves": comparisons.law_curves,
         "scattering-colors": lambda folder: comparisons.law_colors(folder, steps),
@@ -52,19 +51,14 @@ def draw(
         "published": comparisons.published,
         "portraits": lambda folder: portraits.portraits(folder, size, progress),
     }
-    shown = {}
-    with drawing.folder(out) as folder:
-        for name, stage in stages.items():
-            progress(name, None)
-            shown[name] = stage(folder)
-    return shown
+    return drawing.draw_all(out, charts, progress)
 
 
 def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
     """One of the document's sweeps as strips, and the color differences along it."""
     skins = sweep(parameter, steps)
-    found = {a: spectra(skins, a) for a in ABSORPTIONS}
-    looks = {(p, a): shades(found[a], p) for p in PIPELINE_NAMES for a in ABSORPTIONS}
+    reflectance = {a: spectra(skins, a) for a in ABSORPTIONS}
+    looks = {(p, a): shades(reflectance[a], p) for p in PIPELINE_NAMES for a in ABSORPTIONS}
     apart = {p: color.delta_e00(*(looks[p, a][1] for a in ABSORPTIONS)) for p in PIPELINE_NAMES}
     between = color.delta_e00(*(looks[p, "linear"][1] for p in PIPELINE_NAMES))
     base, ends, _ = SWEEPS[parameter]
@@ -74,10 +68,17 @@ def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
         "A sweep of the source document, from exact spectra. Linear absorption is right in the mean; the document's\n"
         "exponential absorption, with steps drawn from μt, comes out too bright."
     )
-    with drawing.figure(9.8, 6.0, title, notes) as drawn:
+    off = {f"delta_e00_linear_to_exponential_{p}": apart[p] for p in PIPELINE_NAMES}
+    off["delta_e00_between_pipelines_linear"] = between
+    rows = [
+        {**plain(skin), "absorption": a, **numbers(r), **{key: float(v[i]) for key, v in off.items()}}
+        for a in ABSORPTIONS
+        for i, (skin, r) in enumerate(zip(skins, reflectance[a], strict=True))
+    ]
+    with drawing.figure(folder, f"sweep-{parameter}", rows, (9.8, 6.0), title, notes) as drawn:
         for i, (pipeline, heading) in enumerate(PIPELINE_NAMES.items()):
             top = 1.32 + 1.2 * i
-            drawn.text(2.1 / 9.8, 1 - (top - 0.07) / 6.0, heading, color=GRAY)
+            write(drawn, 2.1, top - 0.07, heading, color=GRAY)
             for j, a in enumerate(ABSORPTIONS):
                 words = ("linear (exact)", "exponential (biased)")[j]
                 drawing.strip(inches(drawn, 2.1, top + 0.43 * j, 5.6, 0.43), looks[pipeline, a][0], words)
@@ -95,14 +96,6 @@ def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
         axes.grid(axis="y")
         labels = [(float(y[-1]), words, hue) for (y, words), hue in zip(lines, HUES, strict=False)]
         drawing.label_ends(axes, steps - 1, labels, 0.25 * top)
-        off = {f"delta_e00_linear_to_exponential_{p}": apart[p] for p in PIPELINE_NAMES}
-        off["delta_e00_between_pipelines_linear"] = between
-        rows = [
-            {**plain(skin), "absorption": a, **numbers(r), **{key: float(v[i]) for key, v in off.items()}}
-            for a in ABSORPTIONS
-            for i, (skin, r) in enumerate(zip(skins, found[a], strict=True))
-        ]
-        drawing.save(drawn, folder, f"sweep-{parameter}", rows)
     return f"linear to exponential absorption ΔE00 up to {np.max(list(apart.values())):.2f}; {_range(between)}"
 
 
@@ -113,23 +106,24 @@ def _range(between: np.ndarray) -> str:
 def skin_types(folder: Path) -> str:
     """The document's three skin types as patches and spectra, linear beside exponential."""
     skins = [PRESETS[f"source-{name.lower()}"] for name in TYPES]
-    found = {a: spectra(skins, a) for a in ABSORPTIONS}
+    reflectance = {a: spectra(skins, a) for a in ABSORPTIONS}
     off = np.zeros((3, 2))
-    with drawing.figure(
-        12.4, 5.6, "The document's three skin types",
-        "Left half of each patch: linear absorption (exact). Right half: the document's exponential one (biased).",
-    ) as drawn:  # fmt: skip
+    rows = [
+        {"skin": TYPES[i], **plain(skins[i]), "absorption": a, **numbers(r), **columns(r)}
+        for a in ABSORPTIONS for i, r in enumerate(reflectance[a])
+    ]  # fmt: skip
+    notes = "Left half of each patch: linear absorption (exact). Right half: the document's exponential one (biased)."
+    with drawing.figure(folder, "skin-types", rows, (12.4, 5.6), "The document's three skin types", notes) as drawn:
         for i, (name, skin) in enumerate(zip(TYPES, skins, strict=True)):
             left = 1.25 + 1.85 * i
-            drawn.text(left / 12.4, 1 - 1.05 / 5.6, name, size=11)
-            drawn.text(left / 12.4, 1 - 1.13 / 5.6, comparisons.told(skin), color=GRAY, va="top", size=8.5)
+            write(drawn, left, 1.05, name, size=11)
+            write(drawn, left, 1.13, comparisons.told(skin), color=GRAY, va="top", size=8.5)
             for j, pipeline in enumerate(PIPELINE_NAMES):
-                rgb, lab = zip(*(shades(found[a][i], pipeline) for a in ABSORPTIONS), strict=True)
+                rgb, lab = zip(*(shades(reflectance[a][i], pipeline) for a in ABSORPTIONS), strict=True)
                 off[i, j] = color.delta_e00(*lab)
                 axes = inches(drawn, left, 1.95 + 1.75 * j, 1.65, 1.15)
-                drawing.strip(
-                    axes, np.array(rgb), "" if i else PIPELINE_NAMES[pipeline].replace(" color ", "\ncolor\n")
-                )
+                words = "" if i else PIPELINE_NAMES[pipeline].replace(" color ", "\ncolor\n")
+                drawing.strip(axes, np.array(rgb), words)
                 for x, a in zip((0, 1), ABSORPTIONS, strict=True):
                     place = {"transform": axes.transAxes, "ha": ("left", "right")[x], "va": "bottom"}
                     axes.text(x, 1.02, a, color=GRAY, size=8.5, **place)
@@ -138,16 +132,11 @@ def skin_types(folder: Path) -> str:
         axes = inches(drawn, 7.75, 1.1, 3.3, 3.8)
         for i, hue in zip(range(3), HUES, strict=False):
             for a, dash in zip(ABSORPTIONS, DASHES, strict=False):
-                axes.plot(nanometers(), found[a][i], color=hue, linestyle=dash)
+                axes.plot(nanometers(), reflectance[a][i], color=hue, linestyle=dash)
         comparisons.dress_spectra(axes)
         axes.set_title("solid: linear · dashed: exponential", color=GRAY, size=9.5)
-        labels = [(float(found["linear"][i][-1]), TYPES[i], HUES[i]) for i in range(3)]
+        labels = [(float(reflectance["linear"][i][-1]), TYPES[i], HUES[i]) for i in range(3)]
         drawing.label_ends(axes, 780, labels, 0.12)
-        rows = [
-            {"skin": TYPES[i], **plain(skins[i]), "absorption": a, **numbers(r), **columns(r)}
-            for a in ABSORPTIONS for i, r in enumerate(found[a])
-        ]  # fmt: skip
-        drawing.save(drawn, folder, "skin-types", rows)
     return "linear to exponential absorption ΔE00 " + ", ".join(
         f"{name} {row.max():.2f}" for name, row in zip(TYPES, off, strict=True)
     )

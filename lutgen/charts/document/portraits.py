@@ -12,7 +12,7 @@ import lutgen
 from lutgen import device as ocl
 from lutgen.charts import drawing
 from lutgen.charts.document import comparisons
-from lutgen.charts.drawing import GRAY, HUES, inches
+from lutgen.charts.drawing import GRAY, HUES, inches, write
 from lutgen.errors import MachineError
 from lutgen.render import device_scene, film, flat_walk, progressive
 from lutgen.scene import display, subject
@@ -40,16 +40,16 @@ class Portrait:
     pixels: np.ndarray
 
 
-def portraits(folder: Path, size: tuple[int, int] = SIZE, progress: Callable = lambda stage, tally: None) -> str:
+def portraits(folder: Path, size: tuple[int, int] = SIZE, progress: Callable = drawing.silent) -> str:
     """The figure `portraits`; its main figures in words, or why it was left out: it needs OpenCL."""
     try:
         device = ocl.choose()
     except MachineError as error:
         return f"left out: {error}"
-    found = list(_all(device, size, progress))
-    draw(folder, found, size)
-    last = [one for one in found if one.samples == SAMPLES[-1] and one.textures == TEXTURED]
-    noise = ", ".join(f"{one.preset} {one.noise_delta_e00:.1f}" for one in last)
+    heads = list(_all(device, size, progress))
+    draw(folder, heads, size)
+    last = [head for head in heads if head.samples == SAMPLES[-1] and head.textures == TEXTURED]
+    noise = ", ".join(f"{head.preset} {head.noise_delta_e00:.1f}" for head in last)
     return f"ΔE00 of a pixel's noise at {SAMPLES[-1]} samples: {noise}"
 
 
@@ -63,9 +63,9 @@ def _all(device: ocl.Device, size: tuple[int, int], progress: Callable) -> Itera
             look = looks.of_preset(preset, Look() if kind == TEXTURED else Look(bumps=0.0))
             opened = device_scene.open_stage(device, luts, *models[kind], look, size)
             levels = SAMPLES if preset != MEASURED[skin] else SAMPLES[-1:]
-            for made, noise in at_samples(opened, levels):
-                pixels = display.picture(made.rgb, made.mask, look.exposure)
-                yield Portrait(skin, preset, kind, made.samples, noise, pixels)
+            for traced, noise in at_samples(opened, levels):
+                pixels = display.picture(traced.rgb, traced.mask, look.exposure)
+                yield Portrait(skin, preset, kind, traced.samples, noise, pixels)
 
 
 def at_samples(
@@ -73,45 +73,46 @@ def at_samples(
 ) -> Iterator[tuple[film.Picture, float]]:
     """One picture by the flat walk as it is at each number of samples, and its noise in ΔE00."""
     walk = flat_walk.flat(opened, seed)
-    made = film.empty(opened.size, walk.group, {})
+    traced = film.empty(opened.size, walk.group, {})
     for samples in levels:
-        made, _, noise = progressive.render(opened, walk, made, progressive.Goal(samples), lambda one, noise: None)
-        yield made, noise
+        goal = progressive.Goal(samples)
+        traced, _, noise = progressive.render(opened, walk, traced, goal, lambda picture, noise: None)
+        yield traced, noise
 
 
-def draw(folder: Path, found: list[Portrait], size: tuple[int, int]) -> None:
+def draw(folder: Path, heads: list[Portrait], size: tuple[int, int]) -> None:
     """Write the figure `portraits`: a row for each skin, a column for each number of samples."""
     wide, high = SIZE[0] / drawing.DPI, SIZE[1] / drawing.DPI
     columns = [(preset, kind, samples) for preset, kind in (("document", BARE), ("document", TEXTURED))
                for samples in SAMPLES] + [("measured", TEXTURED, SAMPLES[-1])]  # fmt: skip
     width = _LEFT + len(columns) * (wide + _GAP) + 2 * 0.2 + 0.15
     height = _TOP + len(comparisons.TYPES) * (high + _GAP + _FOOT) + 0.1
-    with drawing.figure(
-        width, height, "The document's three skin types on a head, by samples",
+    notes = (
         "`lutgen render`, flat walk, the same head and light for all; under each picture the ΔE00 of a pixel's noise. "
-        "At the right, presets\nfitted to measured light, intermediate and dark skin (ITA classes), the same textures.",
-    ) as drawn:  # fmt: skip
+        "At the right, presets\nfitted to measured light, intermediate and dark skin (ITA classes), the same textures."
+    )
+    rows = [
+        {"skin": head.skin, "preset": head.preset, "textures": head.textures, "samples": head.samples,
+         "noise_delta_e00": head.noise_delta_e00, "brightness": float(head.pixels.mean() / 255)}
+        for head in heads
+    ]  # fmt: skip
+    title = "The document's three skin types on a head, by samples"
+    with drawing.figure(folder, "portraits", rows, (width, height), title, notes) as drawn:
         for i, skin in enumerate(comparisons.TYPES):
             top = _TOP + i * (high + _GAP + _FOOT)
-            drawn.text(0.18 / width, 1 - (top + high / 2) / height, skin, size=11, va="center")
+            write(drawn, 0.18, top + high / 2, skin, size=11, va="center")
             for j, (whose, kind, samples) in enumerate(columns):
                 left = _LEFT + j * (wide + _GAP) + 0.2 * (j >= 3) + 0.2 * (j >= 6)
-                (one,) = (p for p in found if (p.skin, p.textures, p.samples) == (skin, kind, samples)
-                          and (p.preset == MEASURED[skin]) == (whose == "measured"))  # fmt: skip
+                (head,) = (p for p in heads if (p.skin, p.textures, p.samples) == (skin, kind, samples)
+                           and (p.preset == MEASURED[skin]) == (whose == "measured"))  # fmt: skip
                 axes = inches(drawn, left, top, wide, high)
-                axes.imshow(one.pixels, interpolation="none" if size == SIZE else "nearest", aspect="auto")
+                axes.imshow(head.pixels, interpolation="none" if size == SIZE else "nearest", aspect="auto")
                 axes.set_axis_off()
-                words = f"noise {one.noise_delta_e00:.1f}" + (f"   {one.preset}" if whose == "measured" else "")
-                drawn.text(left / width, 1 - (top + high + 0.17) / height, words, color=GRAY, size=8.5)
+                words = f"noise {head.noise_delta_e00:.1f}" + (f"   {head.preset}" if whose == "measured" else "")
+                write(drawn, left, top + high + 0.17, words, color=GRAY, size=8.5)
                 if i:
                     continue
-                drawn.text(left / width, 1 - (_TOP - 0.07) / height, f"{samples} samples", color=GRAY, va="bottom")
+                write(drawn, left, _TOP - 0.07, f"{samples} samples", color=GRAY, va="bottom")
                 if j in (0, 3, 6):
-                    title = "measured skin" if whose == "measured" else f"the document's, {kind}"
-                    drawn.text(left / width, 1 - (_TOP - 0.27) / height, title, color=HUES[j // 3], va="bottom")
-        rows = [
-            {"skin": one.skin, "preset": one.preset, "textures": one.textures, "samples": one.samples,
-             "noise_delta_e00": one.noise_delta_e00, "brightness": float(one.pixels.mean() / 255)}
-            for one in found
-        ]  # fmt: skip
-        drawing.save(drawn, folder, "portraits", rows)
+                    heading = "measured skin" if whose == "measured" else f"the document's, {kind}"
+                    write(drawn, left, _TOP - 0.27, heading, color=HUES[j // 3], va="bottom")

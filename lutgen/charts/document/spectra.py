@@ -95,6 +95,6 @@ def sweep(parameter: str, steps: int) -> list[Skin]:
 def ticks(parameter: str, steps: int) -> tuple[list[float], list[str]]:
     """Where the named values of a sweep lie between its first step, 0, and its last, and their labels."""
     _, ends, values = SWEEPS[parameter]
-    low, high, *at = np.array([*ends, *values]) if parameter == "eumelanin" else np.log([*ends, *values])
-    places = [float((v - low) / (high - low) * (steps - 1)) for v in at]
+    low, high, *named = np.array([*ends, *values]) if parameter == "eumelanin" else np.log([*ends, *values])
+    places = [float((v - low) / (high - low) * (steps - 1)) for v in named]
     return places, [percent(v, parameter) for v in values]

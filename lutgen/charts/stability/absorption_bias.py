@@ -58,13 +58,13 @@ def half_space(albedo: float) -> float:
 
 def walks(photons: int, seed: int = 3) -> list[Biased]:
     """Isotropic half-spaces walked with `albedo` and with `mixed` absorption."""
-    found = []
+    walked = []
     for a in SHARES:
         layer = [Layer(np.inf, a, 1 - a, 0.0, 1.0)]
         albedo, mixed = (direct.shares(layer, photons, seed, absorption=name) for name in ("albedo", "mixed"))
         exact = half_space(1 - a), half_space(1 / (1 + a))
-        found.append(Biased(a, albedo.diffuse, albedo.diffuse_error, mixed.diffuse, mixed.diffuse_error, *exact))
-    return found
+        walked.append(Biased(a, albedo.diffuse, albedo.diffuse_error, mixed.diffuse, mixed.diffuse_error, *exact))
+    return walked
 
 
 def presets() -> dict[str, tuple[float, np.ndarray]]:
@@ -77,24 +77,23 @@ def presets() -> dict[str, tuple[float, np.ndarray]]:
 
 def bias(folder: Path, quick: bool) -> str:
     """Draw `mixed-bias`: brightness against absorbed share beside its closed forms, and ΔE00 on the presets."""
-    found, cost = walks(50_000 if quick else 400_000), presets()
-    with drawing.figure(
-        12.9, 6.0, "The document's exponential absorption with steps from μt (`mixed`) is too bright",
+    walked, cost = walks(50_000 if quick else 400_000), presets()
+    notes = (
         "Left: isotropic half-space of index 1, light along the normal. Points: walked, bars 4 standard errors; lines: "
-        "closed forms.\nRight: what it costs the presets, exact spectra, default color pipeline.",
-    ) as drawn:  # fmt: skip
-        _against_share(inches(drawn, 0.9, 1.2, 5.3, 4.0), found)
+        "closed forms.\nRight: what it costs the presets, exact spectra, default color pipeline."
+    )
+    title = "The document's exponential absorption with steps from μt (`mixed`) is too bright"
+    rows = [{"kind": "half-space", "preset": "", **vars(b), "delta_e00": ""} for b in walked]
+    rows += [{"kind": "preset", "preset": n, "delta_e00": d} for n, (d, _) in cost.items()]
+    with drawing.figure(folder, "mixed-bias", rows, (12.9, 6.0), title, notes) as drawn:
+        _against_share(inches(drawn, 0.9, 1.2, 5.3, 4.0), walked)
         _on_presets(inches(drawn, 8.9, 1.2, 3.3, 4.0), cost)
-        walked = [{"kind": "half-space", "preset": "", **vars(b), "delta_e00": ""} for b in found]
-        empty = dict.fromkeys(walked[0], "")
-        rows = walked + [empty | {"kind": "preset", "preset": n, "delta_e00": d} for n, (d, _) in cost.items()]
-        drawing.save(drawn, folder, "mixed-bias", rows)
     worst = max(cost, key=lambda name: cost[name][0])
-    z = max(abs(b.mixed - b.exact_mixed) / b.mixed_error for b in found)
+    z = max(abs(b.mixed - b.exact_mixed) / b.mixed_error for b in walked)
     return f"mixed absorption costs ΔE00 up to {cost[worst][0]:.2f} ({worst}); closed form within {z:.1f} sigma"
 
 
-def _against_share(axes, found: list[Biased]) -> None:
+def _against_share(axes, walked: list[Biased]) -> None:
     a = np.linspace(0.005, 0.93, 60)
     exact, mixed = (np.array([half_space(v) for v in albedo]) for albedo in (1 - a, 1 / (1 + a)))
     lines = (
@@ -103,12 +102,12 @@ def _against_share(axes, found: list[Biased]) -> None:
     )
     for y, _, hue, dash in lines:
         axes.plot(a, y, color=hue, linestyle=dash, zorder=1)
-    share = [b.absorbed_share for b in found]
-    ratio = np.array([b.mixed / b.exact for b in found])
-    axes.errorbar(share, ratio, [4 * b.mixed_error / b.exact for b in found], fmt="o", color=HUES[1], markersize=5,
+    share = [b.absorbed_share for b in walked]
+    ratio = np.array([b.mixed / b.exact for b in walked])
+    axes.errorbar(share, ratio, [4 * b.mixed_error / b.exact for b in walked], fmt="o", color=HUES[1], markersize=5,
                   capsize=3, linewidth=1.2, zorder=3)  # fmt: skip
-    unbiased = [b.albedo / b.exact for b in found]
-    axes.errorbar(share, unbiased, [4 * b.albedo_error / b.exact for b in found], fmt="s", color=INK, markersize=4,
+    unbiased = [b.albedo / b.exact for b in walked]
+    axes.errorbar(share, unbiased, [4 * b.albedo_error / b.exact for b in walked], fmt="s", color=INK, markersize=4,
                   capsize=3, linewidth=1.2, zorder=2, markerfacecolor="white")  # fmt: skip
     axes.set(xlim=(0, 0.93), ylim=(0.8, 12), yscale="log", xlabel="absorbed share of an event, μa / μt",
              ylabel="brighter than exact by this factor")  # fmt: skip

@@ -79,7 +79,7 @@ def exact(rows: list[list[Stack]], nodes: int = adding_doubling.NODES) -> np.nda
     A row has one thickness and index, a stack one g. Where a row scatters alike, no layer of it is solved twice.
     """
     names = ((0, "mu_a_per_mm"), (-1, "mu_a_per_mm"), (0, "mu_s_per_mm"), (0, "g"), (-1, "mu_s_per_mm"))
-    found = []
+    exact_rows = []
     for row in rows:
         top, two = row[0][0], len(row[0]) == 2
         upper, lower, *optics = np.array([[getattr(stack[i], name) for stack in row] for i, name in names])
@@ -90,8 +90,8 @@ def exact(rows: list[list[Stack]], nodes: int = adding_doubling.NODES) -> np.nda
             E, D, k, optics = E[None], D[None], 0, [values[:1] for values in optics]
         mu_s, g, below = optics
         mm = top.thickness_mm if two else 0.0
-        found.append(adding_doubling.two_layer_grid(mm, E, D, mu_s, g, top.n, below, nodes)[k, e, d])
-    return np.array(found)
+        exact_rows.append(adding_doubling.two_layer_grid(mm, E, D, mu_s, g, top.n, below, nodes)[k, e, d])
+    return np.array(exact_rows)
 
 
 def centers(axis: Axis) -> np.ndarray:
@@ -126,21 +126,21 @@ def method_errors(parameter: str, quick: bool, progress: Callable) -> list[Error
         (Axis("wavelength", "nm", *nm, m + 1), Axis(parameter, "volume fraction", *reach, n + 1, "log"))
         for m, n in (((12, 8), (6, 4)) if quick else ((32, 20), (16, 10)))
     )
-    found: list[ErrorMap] = []
-    for stage, made in (
+    maps: list[ErrorMap] = []
+    for stage, more in (
         ("tables", _tables(*many, 32_768 if quick else 131_072, seed)),
         ("walks", _walks(*few, 8192 if quick else 32_768, seed)),
         ("diffusion", _diffusion(*many)),
     ):
         progress(f"error-{parameter}: {stage}", None)
-        found += made
-    return found
+        maps += more
+    return maps
 
 
-def _answered(name: str, promise: str, x: Axis, y: Axis, found, truth, least, z=None) -> ErrorMap:
+def _answered(name: str, promise: str, x: Axis, y: Axis, estimate, truth, least, z=None) -> ErrorMap:
     """The map of a method that refuses nothing, from [X, Y]: beyond is what errs by more than `least`."""
-    beyond = (abs(found - truth) > least).T
-    return ErrorMap(name, promise, x, y, (found / truth - 1).T, beyond, np.zeros_like(beyond), z)
+    beyond = (abs(estimate - truth) > least).T
+    return ErrorMap(name, promise, x, y, (estimate / truth - 1).T, beyond, np.zeros_like(beyond), z)
 
 
 def _tables(x: Axis, y: Axis, photons: int, seed: int) -> Iterator[ErrorMap]:
@@ -150,31 +150,31 @@ def _tables(x: Axis, y: Axis, photons: int, seed: int) -> Iterator[ErrorMap]:
     truth, of = exact(stacks, TRUTH_NODES), "of the incident light"
     name = f"adding-doubling, {adding_doubling.NODES} nodes"
     yield _answered(name, f"1e-6 {of}", x, y, exact(stacks), truth, NODES_TOLERANCE)
-    found = exact_totals.exact_totals(MIDDLE.tissue)(nm, *mu)
-    yield _answered("table of exact totals", f"1e-5 {of}", x, y, found, truth, TABLE_TOLERANCE)
+    tabled = exact_totals.exact_totals(MIDDLE.tissue)(nm, *mu)
+    yield _answered("table of exact totals", f"1e-5 {of}", x, y, tabled, truth, TABLE_TOLERANCE)
     medium, reach = bake.skin_medium(MIDDLE.tissue, nm)
     paths = path_table.trace(medium, *reach, np.array([0.0, 30.0]), photons, seed)
-    found, sigma = paths.evaluate(*mu)[:, 0], paths.std_error(*mu)[:, 0]
+    mean, sigma = paths.evaluate(*mu)[:, 0], paths.std_error(*mu)[:, 0]
     promise = f"{SIGMAS:g} σ ({photons:,} photons, one trace a column)"
-    yield _answered("path-table", promise, x, y, found, truth, SIGMAS * sigma, ((found - truth) / sigma).T)
+    yield _answered("path-table", promise, x, y, mean, truth, SIGMAS * sigma, ((mean - truth) / sigma).T)
 
 
 def _walks(x: Axis, y: Axis, photons: int, seed: int) -> Iterator[ErrorMap]:
     """`direct` with each absorption, a walk and a seed of its own for each cell."""
     stacks = _stacks(x, y, lambda nm, v: layers(_skin(y, v), nm))
-    bright = [[[replace(one, mu_s_per_mm=one.mu_s_per_mm + one.mu_a_per_mm) for one in stack] for stack in row]
+    bright = [[[replace(x, mu_s_per_mm=x.mu_s_per_mm + x.mu_a_per_mm) for x in stack] for stack in row]
               for row in stacks]  # fmt: skip
     truth, closed = exact(stacks, TRUTH_NODES), exact(bright, TRUTH_NODES)
     flat = [stack for row in stacks for stack in row]
     for absorption in direct.ABSORPTION:
-        walks = [direct.shares(one, photons, seed + k, absorption=absorption) for k, one in enumerate(flat)]
+        walks = [direct.shares(stack, photons, seed + k, absorption=absorption) for k, stack in enumerate(flat)]
         seed += len(flat)
-        found, sigma = np.array([(w.diffuse, w.diffuse_error) for w in walks]).T.reshape(2, *truth.shape)
+        mean, sigma = np.array([(w.diffuse, w.diffuse_error) for w in walks]).T.reshape(2, *truth.shape)
         promise, promised = f"{SIGMAS:g} σ ({photons:,} photons a cell)", truth
         if absorption == "mixed":
             promise, promised = f"closed form, {promise}", closed
-        z = ((found - promised) / sigma).T
-        yield _answered(f"direct ({absorption})", promise, x, y, found, truth, SIGMAS * sigma, z)
+        z = ((mean - promised) / sigma).T
+        yield _answered(f"direct ({absorption})", promise, x, y, mean, truth, SIGMAS * sigma, z)
 
 
 def _diffusion(x: Axis, y: Axis) -> Iterator[ErrorMap]:
@@ -189,8 +189,8 @@ def _diffusion(x: Axis, y: Axis) -> Iterator[ErrorMap]:
 def _asked(solver: ModuleType, name: str, x: Axis, y: Axis, of: Callable[[float, float], Stack]) -> ErrorMap:
     """The map of a diffusion method's total, made to answer where it refuses."""
     stacks = _stacks(x, y, of)
-    found = np.array([[solver.reflectance(stack, unsafe=True).diffuse for stack in row] for row in stacks])
-    error = (found / exact(stacks) - 1).T
+    diffuse = np.array([[solver.reflectance(stack, unsafe=True).diffuse for stack in row] for row in stacks])
+    error = (diffuse / exact(stacks) - 1).T
     refused = np.array([[_refuses(solver, stack) for stack in row] for row in stacks]).T
     promise = f"{100 * dipole.TOLERANCE:g} % of the total, where it answers"
     return ErrorMap(name, promise, x, y, error, abs(error) > dipole.TOLERANCE, refused)
@@ -206,7 +206,7 @@ def diffusion_errors(quick: bool, progress: Callable) -> list[ErrorMap]:
     g, n = Axis("anisotropy g", "1", -0.5, 1, 15 * fine + 1), Axis("refractive index n", "1", 1, 2, 10 * fine + 1)
     thick = Axis("thickness of the slab", "mean free paths", 0.25, 8, 10 * fine + 1, "log")
     radius = Axis("radius", "mean free paths", 0.1, 10, 10 * fine + 1, "log")
-    found = [
+    totals = [
         _asked(dipole, f"dipole, n {N:g}", g, albedo, lambda g, a: [_layer(a, g=g)]),
         _asked(dipole, f"dipole, g {G:g}", n, albedo, lambda n, a: [_layer(a, n=n)]),
         _asked(multipole, f"multipole, {LOWER:g} below", thick, upper, lambda t, a: [_layer(a, t), _layer(LOWER)]),
@@ -215,9 +215,9 @@ def diffusion_errors(quick: bool, progress: Callable) -> list[ErrorMap]:
     progress("diffusion-domain: profiles", None)
     shared = radius, photons
     return [
-        *found[:2],
+        *totals[:2],
         _ringed(dipole, "dipole's profile", DIPOLE_EE, albedo, *shared, lambda a: [_layer(a)]),
-        *found[2:],
+        *totals[2:],
         _ringed(multipole, f"multipole's profile, {SLAB:g} free paths over {LOWER:g}", MULTIPOLE_EE, upper, *shared,
                 lambda a: [_layer(a, SLAB), _layer(LOWER)]),
     ]  # fmt: skip
@@ -233,42 +233,42 @@ def _ringed(solver: ModuleType, name: str, tolerance: float, y: Axis, x: Axis, p
     stacks, radii = [of(float(a)) for a in centers(y)], centers(x)
     edges = np.array([0.0, *radii, np.inf])
     walked = [direct.profile(stack, edges, photons, seed).encircled() for seed, stack in enumerate(stacks, 3000)]
-    found = [solver.profile(stack, edges, unsafe=True).encircled() for stack in stacks]
-    error = (np.array(found) - walked)[:, 1:-1]
+    within = [solver.profile(stack, edges, unsafe=True).encircled() for stack in stacks]
+    error = (np.array(within) - walked)[:, 1:-1]
     refused = np.array([[_refuses(solver, stack, np.array([0.0, r, np.inf])) for r in radii] for stack in stacks])
     promise = f"{tolerance:g} of encircled energy, where it answers"
-    near = 100 * np.sum(found, axis=0)[1] / np.sum(walked, axis=0)[1]
+    near = 100 * np.sum(within, axis=0)[1] / np.sum(walked, axis=0)[1]
     note = f"; {near:.0f} % of the light within {radii[0]:.2g}"
     return ErrorMap(name, promise, x, y, error, abs(error) > tolerance, refused, note=note)
 
 
-def outcome(found: ErrorMap) -> str:
+def outcome(error_map: ErrorMap) -> str:
     """What a map promises and shows, in words."""
-    cells, beyond, silent = found.error.size, int(found.beyond.sum()), int((found.beyond & ~found.refused).sum())
-    if found.z is None:
-        words = "" if not beyond else f", {silent} not refused" if silent else ", all refused"
-        return f"promised: {found.promise}\nfarther off: {beyond} of {cells} cells{words}{found.note}"
-    far = int((abs(found.z) > SIGMAS).sum())
-    words = f"promised: {found.promise}\nlargest |z| {abs(found.z).max():.1f}, {far} of {cells} cells farther"
-    return f"{words} (by chance {CHANCE * cells:.2g})" if far == beyond else f"{words}; off the truth: {beyond}"
+    beyond, z = error_map.beyond, error_map.z
+    cells, farther, silent = beyond.size, int(beyond.sum()), int((beyond & ~error_map.refused).sum())
+    if z is None:
+        words = "" if not farther else f", {silent} not refused" if silent else ", all refused"
+        return f"promised: {error_map.promise}\nfarther off: {farther} of {cells} cells{words}{error_map.note}"
+    far = int((abs(z) > SIGMAS).sum())
+    words = f"promised: {error_map.promise}\nlargest |z| {abs(z).max():.1f}, {far} of {cells} cells farther"
+    return f"{words} (by chance {CHANCE * cells:.2g})" if far == farther else f"{words}; off the truth: {farther}"
 
 
-def _draw(folder: Path, name: str, title: str, notes: str, found: list[ErrorMap], ends, label: str) -> str:
+def _draw(folder: Path, name: str, title: str, notes: str, maps: list[ErrorMap], ends, label: str) -> str:
     """Draw maps as NAME.svg and NAME.png, write their cells as NAME.csv, and return what they show in a line."""
-    silent = {one.name: int((one.beyond & ~one.refused).sum()) for one in found}
+    silent = {m.name: int((m.beyond & ~m.refused).sum()) for m in maps}
     unsaid = "; ".join(f"{method} in {count} cells" for method, count in silent.items() if count) or "none"
     notes += "\nThick outline: farther off than promised. Hatched: refused; drawn is what unsafe=True gives. "
     notes += f"Outlined but not refused: {unsaid}."
-    panels = [drawing.HeatMap(m.name, outcome(m), m.x, m.y, abs(m.error), m.beyond, m.refused) for m in found]
+    panels = [drawing.HeatMap(m.name, outcome(m), m.x, m.y, abs(m.error), m.beyond, m.refused) for m in maps]
     rows = [
-        {"method": one.name, "x": one.x.name, "x_value": float(x), "y": one.y.name, "y_value": float(y),
-         "error": float(one.error[j, i]), "z": "" if one.z is None else float(one.z[j, i]),
-         "beyond": int(one.beyond[j, i]), "refused": int(one.refused[j, i])}
-        for one in found for j, y in enumerate(centers(one.y)) for i, x in enumerate(centers(one.x))
+        {"method": m.name, "x": m.x.name, "x_value": float(x), "y": m.y.name, "y_value": float(y),
+         "error": float(m.error[j, i]), "z": "" if m.z is None else float(m.z[j, i]),
+         "beyond": int(m.beyond[j, i]), "refused": int(m.refused[j, i])}
+        for m in maps for j, y in enumerate(centers(m.y)) for i, x in enumerate(centers(m.x))
     ]  # fmt: skip
-    with drawing.figure(13.4, 4.2 + 3.1 * ((len(found) - 1) // 3), title, notes) as drawn:
+    with drawing.figure(folder, name, rows, (13.4, 4.2 + 3.1 * ((len(maps) - 1) // 3)), title, notes) as drawn:
         drawing.heat_maps(drawn, panels, 1.75, ends, label)
-        drawing.save(drawn, folder, name, rows)
     beyond = sum(row["beyond"] for row in rows)
     return f"{name}: {beyond} of {len(rows)} cells farther off than promised, not refused of them: {unsaid}"
 
@@ -277,24 +277,24 @@ def methods(folder: Path, quick: bool, progress: Callable) -> str:
     """Draw `error-melanin` and `error-hemoglobin`: every method's error over skin and wavelength."""
     shown = []
     for parameter in PARAMETERS:
-        found = method_errors(parameter, quick, progress)
+        maps = method_errors(parameter, quick, progress)
         notes = (
             f"Against adding-doubling ({TRUTH_NODES} nodes; for diffusion {adding_doubling.NODES}). If not said: "
             f"{told(MIDDLE, ', ')}, epidermis {MIDDLE.epidermis_mm:g} mm.\nWhat direct (mixed) promises is its own "
             f"biased closed form: it is outlined where it is farther than {SIGMAS:g} σ from the truth."
         )
         title = f"Error of every method over wavelength and {parameter}"
-        shown.append(_draw(folder, f"error-{parameter}", title, notes, found, (1e-9, 1.0), "|relative error|"))
+        shown.append(_draw(folder, f"error-{parameter}", title, notes, maps, (1e-9, 1.0), "|relative error|"))
     return "; ".join(shown)
 
 
 def diffusion(folder: Path, quick: bool, progress: Callable) -> str:
     """Draw `diffusion-domain`: errors of dipole and multipole over their own parameters, and what they refuse."""
-    found = diffusion_errors(quick, progress)
+    maps = diffusion_errors(quick, progress)
     notes = (
         "Left and middle: totals against adding-doubling. Right: encircled energy against direct, and what share of "
         "direct's light a profile has within the least radius.\n"
         f"Index {N:g} and g {G:g} unless an axis says otherwise; numbers in the multipole's titles are reduced albedos."
     )
     label = "|relative error| of a total, |difference| of encircled energy"
-    return _draw(folder, "diffusion-domain", "Where diffusion can be trusted", notes, found, (1e-3, 1.0), label)
+    return _draw(folder, "diffusion-domain", "Where diffusion can be trusted", notes, maps, (1e-3, 1.0), label)

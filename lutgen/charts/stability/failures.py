@@ -45,12 +45,14 @@ def table(folder: Path, progress: Callable) -> str:
 
 def draw(folder: Path, measured: list[Row]) -> None:
     """One line per failure: words at the left, measured over allowed at the right."""
-    height = 1.7 + 0.36 * len(measured)
-    with drawing.figure(
-        13.6, height + 0.4, "Known failures: how much of what is allowed each uses",
+    size = 13.6, 2.1 + 0.36 * len(measured)
+    notes = (
         "Measured now, seeds fixed. What is counted in σ is chance: any value below its limit is as good as 0. "
-        "Left of the axis: exactly 0, none allowed.",
-    ) as drawn:  # fmt: skip
+        "Left of the axis: exactly 0, none allowed."
+    )
+    rows = [asdict(row) | {"used": row.used} for row in measured]
+    title = "Known failures: how much of what is allowed each uses"
+    with drawing.figure(folder, "failures", rows, size, title, notes) as drawn:
         axes = inches(drawn, 9.2, 1.05, 3.2, 0.36 * len(measured))
         axes.set(xscale="log", xlim=(1e-6, 3), ylim=(len(measured) - 0.5, -0.5), xlabel="measured / allowed")
         axes.set_xticks([1e-6, 1e-4, 1e-2, 1], ["1e-6", "1e-4", "0.01", "limit"])
@@ -67,4 +69,3 @@ def draw(folder: Path, measured: list[Row]) -> None:
             axes.text(-2.82, i - 0.16, row.failure, size=9.5, color=INK, **place)
             axes.text(-2.82, i + 0.2, row.law, size=7, color=GRAY, **place)
             axes.text(-1.32, i - 0.16, row.what, size=8.5, color=GRAY, **place)
-        drawing.save(drawn, folder, "failures", [asdict(row) | {"used": row.used} for row in measured])

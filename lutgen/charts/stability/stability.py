@@ -9,7 +9,7 @@ from lutgen.charts import drawing
 from lutgen.charts.stability import absorption_bias, error_maps, failures
 
 
-def draw(out: Path, quick: bool = False, progress: Callable = lambda stage, tally: None) -> dict[str, str]:
+def draw(out: Path, quick: bool = False, progress: Callable = drawing.silent) -> dict[str, str]:
     """Draw every map into the folder `out`, which appears whole or not at all; what each shows, by its name.
 
     `quick` takes coarser maps. Raises InputError where `out` holds something, MachineError without matplotlib.
