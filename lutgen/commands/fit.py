@@ -99,7 +99,7 @@ def _as_text(result: dict) -> str:
     for name, value in fitted.items():
         sigma = result["sigma"][name]
         lines.append(f"{name:12}{value:.4g}" + (" at its bound" if sigma is None else f" ± {sigma:.2g}"))
-    fixed = [f"{name} {skin[name]:g}" for name in skin_options.CHROMOPHORES if name not in fitted]
+    fixed = [f"{name} {skin[name]:g}" for name in skin_options.FIELDS[:4] if name not in fitted]
     fixed += [
         f"epidermis {skin['epidermis_mm']:g} mm",
         f"{skin['scattering']} scattering",

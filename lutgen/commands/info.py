@@ -23,10 +23,8 @@ def run(options: Namespace) -> Outcome:
     facts = luts.manifest
     lines = [f"{folder.absolute()}: LUT set of lutgen {facts['lutgen']}, {facts['recipe']['totals']} totals"]
     for name, grid in (("color", luts.color_lut.grid), ("profile", luts.profile_lut.grid)):
-        axes = (grid.melanin, grid.eumelanin, grid.hemoglobin)
-        lines.append(
-            f"{name}: " + ", ".join(f"{a.name} {a.low:g} to {a.high:g} ({a.count}, {a.spacing})" for a in axes)
-        )
+        axes = (f"{a.name} {a.low:g} to {a.high:g} ({a.count}, {a.spacing})" for a in reversed(grid.axes))
+        lines.append(f"{name}: {', '.join(axes)}")
     nm = ", ".join(f"{w:g}" for w in facts["quadrature"]["wavelength_nm"])
     rings = len(luts.paths.radius_edges_mm) - 1
     lines.append(f"profiles: {rings} rings to {luts.paths.radius_edges_mm[-1]:g} mm")

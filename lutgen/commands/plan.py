@@ -103,9 +103,9 @@ def _result(plan: Plan) -> dict:
 
 
 def _axes(grid) -> str:
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
     return ", ".join(
-        f"{a.name} {a.low:.4g}" + (f" to {a.high:.4g} ({a.count}, {a.spacing})" if a.count > 1 else "") for a in axes
+        f"{a.name} {a.low:.4g}" + (f" to {a.high:.4g} ({a.count}, {a.spacing})" if a.count > 1 else "")
+        for a in reversed(grid.axes)
     )
 
 

@@ -8,21 +8,19 @@ from dataclasses import replace
 from lutgen.errors import InputError
 from lutgen.skin.tissue import LAWS, READINGS, SKIN_RANGES, Skin
 
-CHROMOPHORES = ("melanin", "eumelanin", "hemoglobin", "oxygenation")
-FIELDS = (*CHROMOPHORES, "epidermis_mm", "scattering", "reading", "saidi_a_per_mm", "saidi_b_nm4_per_mm")
-_NUMBERS = {
+_MEANINGS = {
     "melanin": "share of the epidermis that is melanosomes",
     "eumelanin": "share of the melanin that is eumelanin",
     "hemoglobin": "share of the dermis that is blood",
     "oxygenation": "share of the hemoglobin that carries oxygen",
     "epidermis_mm": "thickness of the epidermis in mm",
+    "scattering": "law of reduced scattering",
+    "reading": "what the law's value means: μs (1 − g), the same with isotropic scattering, or μs itself",
     "saidi_a_per_mm": "A of Saidi's law in 1/mm",
     "saidi_b_nm4_per_mm": "B of Saidi's law in nm⁴/mm",
 }
-_WORDS = {
-    "scattering": ("law of reduced scattering", LAWS),
-    "reading": ("what the law's value means: μs (1 − g), the same with isotropic scattering, or μs itself", READINGS),
-}
+_CHOICES = {"scattering": LAWS, "reading": READINGS}
+FIELDS = tuple(_MEANINGS)
 
 
 def arguments(parser: ArgumentParser, base: Skin, default: str = "{}", **defaults: str) -> None:
@@ -30,15 +28,14 @@ def arguments(parser: ArgumentParser, base: Skin, default: str = "{}", **default
 
     What stands for a parameter that is not given is told by `defaults`, else by `default` around `base`'s value.
     """
-    for name in FIELDS:
+    for name, meaning in _MEANINGS.items():
         option, value = f"--{name.replace('_', '-')}", getattr(base, name)
         text = defaults.get(name) or default.format(f"{value:g}" if isinstance(value, float) else value)
-        if name in _NUMBERS:
-            low, high = SKIN_RANGES[name]
-            parser.add_argument(option, type=float, help=f"{_NUMBERS[name]}, {low:g} to {high:g} (default: {text})")
+        if name in _CHOICES:
+            parser.add_argument(option, choices=_CHOICES[name], help=f"{meaning} (default: {text})")
         else:
-            meaning, allowed = _WORDS[name]
-            parser.add_argument(option, choices=allowed, help=f"{meaning} (default: {text})")
+            low, high = SKIN_RANGES[name]
+            parser.add_argument(option, type=float, help=f"{meaning}, {low:g} to {high:g} (default: {text})")
 
 
 def parameters(options: Namespace) -> dict:
