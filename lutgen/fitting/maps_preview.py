@@ -6,10 +6,10 @@ import numpy as np
 from PIL import Image
 
 from lutgen import color
-from lutgen.files.paper import GRAY, INK, OVERSAMPLE, RULE, Sheet
 from lutgen.fitting import skin_colors
 from lutgen.fitting.albedo_to_skin import Inversion
 from lutgen.fitting.maps_folder import REACH, Layer
+from lutgen.tables.canvas import GRAY, INK, OVERSAMPLE, RULE, Canvas
 from lutgen.tables.lut_set import LutSet
 
 WIDTH, SIDE, GAP, TOP = 1200, 368, 24, 104
@@ -43,35 +43,35 @@ def draw(
         panels.append((f"on {name}", "detail kept", _bytes(recolored[pick])))
     height = round(SIDE * thin.shape[0] / thin.shape[1])
     height = min(max(height, 60), 3 * SIDE)
-    sheet = Sheet(WIDTH, TOP + 2 * (height + 52))
-    sheet.text(24, 40, "Maps from a painted albedo", 22)
-    sheet.text(24, 62, words, 13, GRAY)
-    sheet.line([(24, 76), (WIDTH - 24, 76)], RULE)
+    canvas = Canvas(WIDTH, TOP + 2 * (height + 52))
+    canvas.text(24, 40, "Maps from a painted albedo", 22)
+    canvas.text(24, 62, words, 13, GRAY)
+    canvas.line([(24, 76), (WIDTH - 24, 76)], RULE)
     for i, (title, note, pixels) in enumerate(panels):
         x, y = 24 + i % 3 * (SIDE + GAP), TOP + i // 3 * (height + 52)
-        sheet.text(x, y, title, 14)
-        sheet.text(x + SIDE, y, note, 12, GRAY, "rs")
+        canvas.text(x, y, title, 14)
+        canvas.text(x + SIDE, y, note, 12, GRAY, "rs")
         pixels = np.where(painted[..., None], pixels, _BACKGROUND)
         size = SIDE * OVERSAMPLE, height * OVERSAMPLE
-        sheet.image.paste(
+        canvas.image.paste(
             Image.fromarray(pixels).resize(size, Image.Resampling.BILINEAR), (x * OVERSAMPLE, (y + 10) * OVERSAMPLE)
         )
-        sheet.box((x, y + 10, x + SIDE, y + 10 + height), outline=RULE)
+        canvas.box((x, y + 10, x + SIDE, y + 10 + height), outline=RULE)
         if title == "color difference left":
-            _scale(sheet, x + SIDE, y)
-    return sheet.image.reduce(OVERSAMPLE)
+            _scale(canvas, x + SIDE, y)
+    return canvas.image.reduce(OVERSAMPLE)
 
 
-def _scale(sheet: Sheet, right: float, y: float) -> None:
+def _scale(canvas: Canvas, right: float, y: float) -> None:
     """The colors of differences, from none to twice the reach."""
     left, width = right - 150, 110
-    sheet.text(left - 6, y, "0", 12, GRAY, "rs")
+    canvas.text(left - 6, y, "0", 12, GRAY, "rs")
     for k in range(width):
         at = k / (width - 1) * (len(_LEFT) - 1)
         ink = [round(float(np.interp(at, np.arange(len(_LEFT)), channel))) for channel in _LEFT.T]
-        sheet.box((left + k, y - 9, left + k + 1, y), "#" + bytes(ink).hex())
-    sheet.box((left, y - 9, left + width, y), outline=GRAY)
-    sheet.text(right, y, f"{2 * REACH:g}+", 12, INK, "rs")
+        canvas.box((left + k, y - 9, left + k + 1, y), "#" + bytes(ink).hex())
+    canvas.box((left, y - 9, left + width, y), outline=GRAY)
+    canvas.text(right, y, f"{2 * REACH:g}+", 12, INK, "rs")
 
 
 def _fewer(shape: tuple[int, ...]) -> tuple[slice, slice]:

@@ -6,9 +6,9 @@ import numpy as np
 from PIL import Image
 
 from lutgen import color
-from lutgen.files.paper import GRAY, INK, OVERSAMPLE, Sheet
 from lutgen.render.compare import BOX, Difference
 from lutgen.render.compare_files import Picture
+from lutgen.tables.canvas import GRAY, INK, OVERSAMPLE, Canvas
 
 _RAMP = np.array([[12, 12, 28], [59, 25, 99], [140, 41, 99], [214, 77, 59], [249, 152, 30], [252, 240, 160]])
 """From none to much, evenly spaced: darker is less, also for those who see no red or green."""
@@ -23,7 +23,7 @@ def draw(a: Picture, b: Picture, found: Difference) -> Image.Image:
     rows, columns = a.acescg.shape[:2]
     factor = max(1, -(-_LEAST_SIDE // columns))
     width, height = columns * factor, rows * factor
-    sheet = Sheet(3 * width + 4 * _GAP, _HEAD + height + _FOOT)
+    canvas = Canvas(3 * width + 4 * _GAP, _HEAD + height + _FOOT)
     end = next((e for e in _ENDS if found.p95.value <= 0.8 * e), _ENDS[-1])
     words = (
         f"mean {found.mean.value:.2f} ± {found.mean.sigma:.2f}, median {found.median.value:.2f}, "
@@ -33,21 +33,21 @@ def draw(a: Picture, b: Picture, found: Difference) -> Image.Image:
     panels = [(_display(a), "A", a.name), (_display(b), "B", b.name), (change, "Color difference", words)]
     for k, (pixels, title, line) in enumerate(panels):
         left = _GAP + k * (width + _GAP)
-        sheet.text(left, 26, title, 16)
-        sheet.text(left, 48, _shortened(sheet, line, width), 12, GRAY)
+        canvas.text(left, 26, title, 16)
+        canvas.text(left, 48, _shortened(canvas, line, width), 12, GRAY)
         large = pixels.repeat(factor * OVERSAMPLE, axis=0).repeat(factor * OVERSAMPLE, axis=1)
-        sheet.image.paste(Image.fromarray(large), (left * OVERSAMPLE, _HEAD * OVERSAMPLE))
+        canvas.image.paste(Image.fromarray(large), (left * OVERSAMPLE, _HEAD * OVERSAMPLE))
     left, top = _GAP + 2 * (width + _GAP), _HEAD + height + 12
     bar = _colors(np.linspace(0, 1, width * OVERSAMPLE))[None].repeat(12 * OVERSAMPLE, axis=0)
-    sheet.image.paste(Image.fromarray(bar), (left * OVERSAMPLE, top * OVERSAMPLE))
+    canvas.image.paste(Image.fromarray(bar), (left * OVERSAMPLE, top * OVERSAMPLE))
     for k in range(6):
         more = "+" if k == 5 and found.most > end else ""
         anchor = "ls" if k == 0 else "rs" if k == 5 else "ms"
-        sheet.text(left + width * k / 5, top + 28, f"{end * k / 5:g}{more}", 11, INK, anchor)
-    sheet.text(
+        canvas.text(left + width * k / 5, top + 28, f"{end * k / 5:g}{more}", 11, INK, anchor)
+    canvas.text(
         _GAP, top + 28, f"CIEDE2000 of boxes of {BOX} x {BOX} pixels, noise taken off; gray: not compared", 11, GRAY
     )
-    return sheet.image.reduce(OVERSAMPLE)
+    return canvas.image.reduce(OVERSAMPLE)
 
 
 def _display(one: Picture) -> np.ndarray:
@@ -67,7 +67,7 @@ def _colors(share: np.ndarray) -> np.ndarray:
     )
 
 
-def _shortened(sheet: Sheet, words: str, width: float) -> str:
-    while len(words) > 4 and sheet.measure(words, 12) > width:
+def _shortened(canvas: Canvas, words: str, width: float) -> str:
+    while len(words) > 4 and canvas.measure(words, 12) > width:
         words = words[:-4] + "..."
     return words

@@ -9,13 +9,14 @@ import pytest
 from lutgen import device as ocl
 from lutgen import solvers
 from lutgen.charts.accuracy import absorption
-from lutgen.skin.tissue import Layer, layers, preset
+from lutgen.charts.document.spectra import as_mixed
+from lutgen.skin.tissue import layers, preset
 from lutgen.solvers import path_table
 
 DARK, LIGHT = ("dark", 550.0), ("light", 460.0)
 
 
-def found(place: tuple[str, float], walk: str, photons: int):
+def walked(place: tuple[str, float], walk: str, photons: int):
     """Mean and standard error of the reflectance by one walk, and the share of photons that left."""
     weights, _, _ = absorption.run(*place, walk, photons, 11, ocl.choose())
     mean = weights.sum() / photons
@@ -26,7 +27,7 @@ def found(place: tuple[str, float], walk: str, photons: int):
 @pytest.mark.parametrize("walk", ["albedo", "continuous", "own nu", "bake nu", "capped"])
 def test_unbiased_walks_agree_with_adding_doubling(place, walk):
     exact = solvers.reflectance(layers(preset(place[0]), place[1])).diffuse
-    mean, sigma, left = found(place, walk, 131_072)
+    mean, sigma, left = walked(place, walk, 131_072)
     cut = np.exp(-absorption.CAP) * (1 - left) if walk == "capped" else 0.0  # no photon that met the cap weighed more
     assert -cut - 4 * sigma < mean - exact < 4 * sigma
     assert sigma < 0.01 * exact
@@ -34,9 +35,8 @@ def test_unbiased_walks_agree_with_adding_doubling(place, walk):
 
 def test_the_mixed_walk_is_off_by_what_the_chart_says():
     skin = layers(preset(DARK[0]), DARK[1])
-    alike = [Layer(x.thickness_mm, x.mu_a_per_mm, x.mu_s_per_mm + x.mu_a_per_mm, x.g, x.n) for x in skin]
-    mean, sigma, _ = found(DARK, "mixed", 131_072)
-    assert abs(mean - solvers.reflectance(alike).diffuse) < 4 * sigma
+    mean, sigma, _ = walked(DARK, "mixed", 131_072)
+    assert abs(mean - solvers.reflectance(as_mixed(skin)).diffuse) < 4 * sigma
     assert mean - solvers.reflectance(skin).diffuse > 10 * sigma
 
 
@@ -61,9 +61,9 @@ def test_without_another_life_the_walk_draws_them():
 
 def test_factors_of_weights_known_by_hand():
     # 200 photons, half of them weigh 1: variance 1/4, the square of the mean; 1 % needs 1 / 0.01² photons.
-    one = absorption.factors(100.0, 100.0, 200, 4000, 2e-6, 0.5)
-    assert one == pytest.approx([0.5, 20, 10_000, 0.1])
-    assert one[3] == pytest.approx(one[0] * one[1] * one[2] * 1e-6)
+    factors = absorption.factors(100.0, 100.0, 200, 4000, 2e-6, 0.5)
+    assert factors == pytest.approx([0.5, 20, 10_000, 0.1])
+    assert factors[3] == pytest.approx(factors[0] * factors[1] * factors[2] * 1e-6)
     dimmer = absorption.factors(100.0, 100.0, 200, 4000, 2e-6, 0.25)
     assert dimmer == pytest.approx([0.5, 20, 40_000, 0.4])
 

@@ -16,6 +16,8 @@ from lutgen.solvers import adding_doubling
 
 PANEL = methods.jury(2, seed=3)
 WHOLE = methods.jury(seed=3)
+FEW = replace(PANEL, nodes=PANEL.nodes[::4], chromophores=PANEL.chromophores[:, ::4])
+"""A quarter of the nodes, for what is worked out at each of them alone."""
 
 
 def test_a_jury_of_cells_holds_their_corners_and_skins_inside():
@@ -42,8 +44,8 @@ def test_the_truth_of_a_jury_is_adding_doubling_at_5_nm():
 def test_exact_methods_agree_on_nodes_and_end_at_interpolation():
     factored, tabled = methods.factored("8"), methods.tabled("8")
     assert np.abs(factored - tabled).max() < 2e-5
-    alone = methods.one_by_one(methods._stacked, PANEL)
-    assert np.abs(alone - factored[PANEL.nodes]).max() < 1e-9
+    alone = methods.one_by_one(methods._stacked, FEW)
+    assert np.abs(alone - factored[FEW.nodes]).max() < 1e-9
     floor = methods.judge(methods.tabled("5nm"), WHOLE)
     assert methods.judge(factored, WHOLE) == pytest.approx(floor, abs=0.05)
     assert methods.judge(factored * 1.01, WHOLE)[1] > floor[1] + 0.05
@@ -59,13 +61,12 @@ def test_walks_end_at_the_floor_and_err_more_with_fewer_photons():
 
 def test_mixed_absorption_ends_at_its_bias_and_albedo_does_not():
     """The document's exponential: 32,768 photons at each node still err by what its bias costs."""
-    dark = replace(PANEL, skins=PANEL.skins[:, :0], lab=PANEL.lab[:0])
     photons = 32_768
     mixed, albedo = (
-        methods.one_by_one(lambda s, nm, a=a: methods._drawn(s, nm, a, photons, iter([int(1e4 * s.melanin)])), dark)
+        methods.one_by_one(lambda s, nm, a=a: methods._drawn(s, nm, a, photons, iter([int(1e4 * s.melanin)])), FEW)
         for a in ("mixed", "albedo")
     )
-    expected, exact = (methods.one_by_one(f, dark) for f in (methods._as_mixed, methods._stacked))
+    expected, exact = (methods.one_by_one(f, FEW) for f in (methods._mixed, methods._stacked))
     weights = np.abs(methods.rule_weights(methods.quadrature.load("8")))
     sigma = np.sqrt(
         exact.max() / photons * (weights**2).sum(axis=0)
@@ -82,29 +83,28 @@ def test_pareto_front():
 
 def runs() -> list[methods.Run]:
     """Made-up runs of every method, two seeds of each walk."""
-    found = [methods.Run("path table, anchored", 9, 0, 1.0, 1.0, True, 9, 0.2, 0.3)]
+    made_up = [methods.Run("path table, anchored", 9, 0, 1.0, 1.0, True, 9, 0.2, 0.3)]
     for i, method in enumerate(("adding-doubling, factored, 8 wavelengths", "dipole", "multipole")):
-        found.append(methods.Run(method, 0, 0, 2.0 + i, 0.5, False, 9, 0.2, 0.3))
+        made_up.append(methods.Run(method, 0, 0, 2.0 + i, 0.5, False, 9, 0.2, 0.3))
     for k, method in enumerate(("path table, 8 wavelengths", "path table, 6 wavelengths")):
         for photons, seed in ((1000, 0), (1000, 1), (4000, 0), (4000, 1)):
-            found.append(methods.Run(method, photons, seed, photons / 9e4, 1.0, True, 9, 1.0 + seed + k, 3.0))
+            made_up.append(methods.Run(method, photons, seed, photons / 9e4, 1.0, True, 9, 1.0 + seed + k, 3.0))
     for absorption in ("albedo", "continuous", "mixed"):
         for photons in (64, 256):
-            found.append(methods.Run(f"direct, {absorption}", photons, 0, photons / 9, 0.1, False, 9, 1.0, 3.0))
-    return found
+            made_up.append(methods.Run(f"direct, {absorption}", photons, 0, photons / 9, 0.1, False, 9, 1.0, 3.0))
+    return made_up
 
 
 def test_the_chart_and_its_table_hold_every_run_and_floor(tmp_path: Path):
     pytest.importorskip("matplotlib")
-    found = runs()
-    found.sort(key=lambda run: not run.method.startswith("path table, 8"))
-    speed.draw(tmp_path, found, {"interpolation between nodes": (0.17, 0.23)})
+    drawn = sorted(runs(), key=lambda run: not run.method.startswith("path table, 8"))
+    speed.draw(tmp_path, drawn, {"interpolation between nodes": (0.17, 0.23)})
     with (tmp_path / "speed-accuracy.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == len(found) + 1
+    assert len(rows) == len(drawn) + 1
     assert rows[-1]["floor"] == "interpolation between nodes"
     picture = (tmp_path / "speed-accuracy.svg").read_text()
-    for method in {run.method for run in found}:
+    for method in {run.method for run in drawn}:
         assert method in picture
 
 
@@ -120,16 +120,21 @@ def test_half_space_is_the_h_function():
         assert absorption_bias.half_space(albedo) == pytest.approx(expected, abs=2e-9)
 
 
-def test_walks_with_mixed_absorption_meet_their_closed_form():
-    found = absorption_bias.walks(20_000)
-    for b in found:
+@pytest.fixture(scope="module")
+def walked() -> list[absorption_bias.Biased]:
+    return absorption_bias.walks(20_000)
+
+
+def test_walks_with_mixed_absorption_meet_their_closed_form(walked):
+    for b in walked:
         assert abs(b.mixed - b.exact_mixed) < 4 * b.mixed_error
         assert abs(b.albedo - b.exact) < 4 * b.albedo_error
-    assert found[-1].exact_mixed > 5 * found[-1].exact
+    assert walked[-1].exact_mixed > 5 * walked[-1].exact
 
 
-def test_what_mixed_costs_rises_with_melanin(tmp_path: Path):
+def test_what_mixed_costs_rises_with_melanin(walked, tmp_path: Path, monkeypatch):
     pytest.importorskip("matplotlib")
+    monkeypatch.setattr(absorption_bias, "walks", lambda photons: walked)
     words = absorption_bias.bias(tmp_path, True)
     with (tmp_path / "mixed-bias.csv").open() as file:
         cost = {row["preset"]: float(row["delta_e00"]) for row in csv.DictReader(file) if row["preset"]}

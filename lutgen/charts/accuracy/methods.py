@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from lutgen import color
 from lutgen import device as ocl
+from lutgen.charts.document.spectra import as_mixed
 from lutgen.charts.drawing import silent
 from lutgen.charts.stability.error_maps import mixed_layer
 from lutgen.skin import chromophores, tissue
@@ -167,10 +168,8 @@ def _stacked(skin: tissue.Skin, nm: float) -> float:
     return adding_doubling.reflectance(tissue.layers(skin, nm)).diffuse
 
 
-def _as_mixed(skin: tissue.Skin, nm: float) -> float:
-    """What `mixed` absorption tends to: the exact solution of a medium that scatters with mu_s + mu_a."""
-    stack = [replace(x, mu_s_per_mm=x.mu_s_per_mm + x.mu_a_per_mm) for x in tissue.layers(skin, nm)]
-    return adding_doubling.reflectance(stack).diffuse
+def _mixed(skin: tissue.Skin, nm: float) -> float:
+    return adding_doubling.reflectance(as_mixed(tissue.layers(skin, nm))).diffuse
 
 
 def _one_layer(skin: tissue.Skin, nm: float) -> float:
@@ -229,7 +228,7 @@ def floors(quick: bool) -> dict[str, tuple[float, float]]:
         lab = color.lab(_spectra(everything.skins, rule.wavelength_nm) @ rule.xyz_weights)
         apart = color.delta_e00(lab, everything.lab)
         ends[f"quadrature of {name} wavelengths"] = float(np.percentile(apart, 95)), float(apart.max())
-    ends["bias of mixed absorption"] = judge(one_by_one(_as_mixed, some), some)
+    ends["bias of mixed absorption"] = judge(one_by_one(_mixed, some), some)
     return ends
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from lutgen import color
 from lutgen.errors import one_of
 from lutgen.skin import chromophores
-from lutgen.skin.tissue import Skin, dermis_scattering, scattering
+from lutgen.skin.tissue import Layer, Skin, dermis_scattering, scattering
 from lutgen.solvers import adding_doubling, exact_totals
 
 ABSORPTIONS = ("linear", "exponential")
@@ -53,6 +53,11 @@ def _exponential(skin: Skin) -> np.ndarray:
     return adding_doubling.two_layer_grid(
         skin.epidermis_mm, mu_e[:, None], mu_d[:, None], mu_s + mu_e, g, skin.refractive_index, below, nodes=_STREAMS
     )[:, 0, 0]
+
+
+def as_mixed(stack: list[Layer]) -> list[Layer]:
+    """What `mixed` absorption solves in place of a stack: layers that scatter with mu_s + mu_a."""
+    return [replace(layer, mu_s_per_mm=layer.mu_s_per_mm + layer.mu_a_per_mm) for layer in stack]
 
 
 def shades(reflectance: np.ndarray, pipeline: str = "default") -> tuple[np.ndarray, np.ndarray]:

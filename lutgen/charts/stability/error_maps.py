@@ -11,6 +11,7 @@ import numpy as np
 
 from lutgen.charts import drawing
 from lutgen.charts.document.comparisons import told
+from lutgen.charts.document.spectra import as_mixed
 from lutgen.errors import InputError
 from lutgen.skin import chromophores
 from lutgen.skin.tissue import REFRACTIVE_INDEX, Layer, Skin, layers, preset
@@ -162,8 +163,7 @@ def _tables(x: Axis, y: Axis, photons: int, seed: int) -> Iterator[ErrorMap]:
 def _walks(x: Axis, y: Axis, photons: int, seed: int) -> Iterator[ErrorMap]:
     """`direct` with each absorption, a walk and a seed of its own for each cell."""
     stacks = _stacks(x, y, lambda nm, v: layers(_skin(y, v), nm))
-    bright = [[[replace(x, mu_s_per_mm=x.mu_s_per_mm + x.mu_a_per_mm) for x in stack] for stack in row]
-              for row in stacks]  # fmt: skip
+    bright = [[as_mixed(stack) for stack in row] for row in stacks]
     truth, closed = exact(stacks, TRUTH_NODES), exact(bright, TRUTH_NODES)
     flat = [stack for row in stacks for stack in row]
     for absorption in direct.ABSORPTION:

@@ -14,6 +14,7 @@ import numpy as np
 
 import lutgen
 from lutgen import device as ocl
+from lutgen.charts.document.spectra import as_mixed
 from lutgen.charts.stability.kernel_values import WIDTHS, draws, evaluate, wide
 from lutgen.skin.tissue import Layer, Skin, Tissue, layers, preset
 from lutgen.solvers import adding_doubling, dipole, direct, path_table, paths, profiles
@@ -198,9 +199,8 @@ def used_budget() -> float:
 def mixed_closed_form() -> float:
     """Steps from mu_t that keep exp(-mu_a s) solve, exactly, a medium that scatters with mu_s + mu_a."""
     stack = layers(Skin(0.43, 0.7, 0.01), 450)
-    as_scattering = [Layer(x.thickness_mm, x.mu_a_per_mm, x.mu_s_per_mm + x.mu_a_per_mm, x.g, x.n) for x in stack]
     walked = direct.shares(stack, 100_000, 5, absorption="mixed")
-    return abs(walked.diffuse - adding_doubling.stack(as_scattering)[0]) / walked.diffuse_error
+    return abs(walked.diffuse - adding_doubling.stack(as_mixed(stack))[0]) / walked.diffuse_error
 
 
 def quadrature_drift() -> float:

@@ -1,4 +1,4 @@
-"""Paper to draw labelled charts on, with Pillow and its own font."""
+"""A white canvas for labelled charts, with Pillow and its own font: what pictures of the core are drawn on."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def _font(size: float) -> ImageFont.FreeTypeFont:
     return ImageFont.load_default(size=size)  # type: ignore[return-value]
 
 
-class Sheet:
-    """White paper to draw on in pixels of the finished picture; drawn larger, then reduced."""
+class Canvas:
+    """A white picture, drawn on in pixels of the finished one; it is kept larger, then reduced."""
 
     def __init__(self, width: int, height: int):
         self.image = Image.new("RGB", (width * OVERSAMPLE, height * OVERSAMPLE), PAPER)
@@ -27,8 +27,16 @@ class Sheet:
 
     def text(self, x: float, y: float, words: str, size=12, fill=INK, anchor="ls", halo: str | None = None) -> None:
         """Write at an anchor (Pillow's two letters; baseline left)."""
-        at, outline = (x * OVERSAMPLE, y * OVERSAMPLE), 3 * OVERSAMPLE if halo else 0
-        self.pen.text(at, words, fill, _font(size * OVERSAMPLE), anchor, stroke_width=outline, stroke_fill=halo)
+        outline = 3 * OVERSAMPLE if halo else 0
+        self.pen.text(
+            (x * OVERSAMPLE, y * OVERSAMPLE),
+            words,
+            fill,
+            _font(size * OVERSAMPLE),
+            anchor,
+            stroke_width=outline,
+            stroke_fill=halo,
+        )
 
     def measure(self, words: str, size: float) -> float:
         """Width of the words in pixels of the finished picture."""
@@ -37,7 +45,7 @@ class Sheet:
     def upright(self, x: float, y: float, words: str, size=12, fill=GRAY) -> None:
         """Write upward, centered on (x, y)."""
         along, across = round(self.measure(words, size) + 4), round(size * 1.6)
-        label = Sheet(along, across)
+        label = Canvas(along, across)
         label.text(along / 2, across / 2, words, size, fill, "mm")
         corner = round((x - across / 2) * OVERSAMPLE), round((y - along / 2) * OVERSAMPLE)
         self.image.paste(label.image.transpose(Image.Transpose.ROTATE_90), corner)
@@ -49,8 +57,8 @@ class Sheet:
         if dash:
             along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
             starts = np.arange(0, along[-1], sum(dash) * OVERSAMPLE)
-            at = np.linspace(starts, np.minimum(starts + dash[0] * OVERSAMPLE, along[-1]), 4, axis=1)
-            pieces = np.stack([np.interp(at, along, values) for values in points.T], axis=-1)
+            inked = np.linspace(starts, np.minimum(starts + dash[0] * OVERSAMPLE, along[-1]), 4, axis=1)
+            pieces = np.stack([np.interp(inked, along, values) for values in points.T], axis=-1)
         for piece in pieces:
             self.pen.line([tuple(p) for p in piece], fill, round(width * OVERSAMPLE), joint="curve")
 
@@ -66,12 +74,12 @@ class Sheet:
     def frame(self, box: Box, x_ticks, y_ticks, x_label: str, y_label: str = "", grid: bool = False) -> None:
         """Outline a plot; ticks are (fraction of the side, label), the y label stands left of the y ticks' labels."""
         left, top, right, bottom = box
-        for at, words in x_ticks:
-            x = left + at * (right - left)
+        for share, words in x_ticks:
+            x = left + share * (right - left)
             self.line([(x, top if grid else bottom), (x, bottom + 4)], RULE if grid else GRAY)
             self.text(x, bottom + 15, words, 11, anchor="ms")
-        for at, words in y_ticks:
-            y = bottom - at * (bottom - top)
+        for share, words in y_ticks:
+            y = bottom - share * (bottom - top)
             self.line([(left - 4, y), (right if grid else left - 1, y)], RULE if grid else GRAY)
             self.text(left - 7, y, words, 11, anchor="rm")
         self.box(box, outline=GRAY)
