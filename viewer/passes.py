@@ -38,7 +38,7 @@ def require(stage: Stage, look: Look) -> None:
     """Raise InputError where the stage cannot show a look: chromophores outside the LUTs' axes, no LUT set to split."""
     for name in {"none", look.split} & {"none", "set"}:
         grid = side(stage, name).luts.color_lut.grid
-        for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin):
+        for axis in grid.axes:
             in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
 
 
@@ -101,7 +101,7 @@ def cast_shadow(stage: Stage, look: Look) -> None:
 def skin_of(stage: Stage, look: Look) -> dict:
     """Uniforms that say what the look's skin is, and how far the maps change it."""
     grid = stage.sides["none"].luts.color_lut.grid
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    axes = grid.axes[::-1]
     return {
         "chromophores": (look.melanin, look.eumelanin, look.hemoglobin),
         "contrast": texture_maps.contrast(stage.full_contrast_melanin, look.melanin),

@@ -59,7 +59,7 @@ def ring_error(source: Source, texels: np.ndarray, skins: int = POINTS // 10) ->
     """Difference of the encircled energy that a shader reads from profile texels [nodes, 64, 4] from the set's own,
     over radii of 0.01 mm and more, at random skins."""
     grid = source.luts.profile_lut.grid
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    axes = grid.axes[::-1]
     points = np.clip(source.skins[:skins], [axis.low for axis in axes], [axis.high for axis in axes])
     read = grid.interpolate(texels.reshape(*grid.shape, -1, 4).astype(float), *points.T)
     off = []

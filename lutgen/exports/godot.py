@@ -13,8 +13,9 @@ import numpy as np
 
 from lutgen.exports import lookup
 from lutgen.exports.engine_textures import slices
-from lutgen.exports.resampled import AXES, MADE, MEANING, Preset, Report, Source
+from lutgen.exports.resampled import MADE, MEANING, Preset, Report, Source
 from lutgen.files import exr
+from lutgen.skin.chromophores import NAMES
 from lutgen.tables import shader_axes
 
 COLOR, PROFILE, SHADER, SCENE = "skin_color.exr", "skin_profile.exr", "skin.gdshader", "skin.tscn"
@@ -72,11 +73,11 @@ def sidecar(importer: str, kind: str, parameters: dict) -> str:
 def shader_text(source: Source) -> str:
     """The shader: its sliders span the set's axes and start at the first preset that the set covers."""
     sliders = []
-    start = source.presets[0].skin if source.presets else [getattr(source.grid, name).low for name in AXES]
-    for name, value in zip(AXES, start, strict=True):
-        axis = getattr(source.grid, name)
+    axes = source.grid.axes[::-1]
+    start = source.presets[0].skin if source.presets else [axis.low for axis in axes]
+    for axis, value in zip(axes, start, strict=True):
         span = f" : hint_range({axis.low:.9g}, {axis.high:.9g}, 0.0001)" if axis.count > 1 else ""
-        sliders.append(f"uniform float {name}{span} = {float(value)};")
+        sliders.append(f"uniform float {axis.name}{span} = {float(value)};")
     text = files("lutgen.exports").joinpath("templates", SHADER).read_text(encoding="utf-8")
     functions = lookup.text(source, "gdshader").strip()
     parts = {"SLIDERS": "\n".join(sliders), "FUNCTIONS": functions, "SPECULAR": f"{(1 - source.entry) / 0.08:.3g}"}
@@ -87,7 +88,7 @@ def shader_text(source: Source) -> str:
 
 def material(preset: Preset) -> str:
     """A ShaderMaterial of a preset."""
-    values = "\n".join(f"shader_parameter/{name} = {v:.9g}" for name, v in zip(AXES, preset.skin, strict=True))
+    values = "\n".join(f"shader_parameter/{name} = {v:.9g}" for name, v in zip(NAMES, preset.skin, strict=True))
     return (
         '[gd_resource type="ShaderMaterial" format=3]\n\n'
         f'[ext_resource type="Shader" path="{SHADER}" id="shader"]\n'

@@ -9,14 +9,13 @@ import numpy as np
 
 from lutgen import color
 from lutgen.errors import whole
-from lutgen.skin.tissue import PRESETS, REFRACTIVE_INDEX
+from lutgen.skin.tissue import PRESETS
 from lutgen.solvers import burley
 from lutgen.tables import expand
 from lutgen.tables.axes import Grid
 from lutgen.tables.lut_set import LutSet
 
 SIZES = (2, 256)
-AXES = ("melanin", "eumelanin", "hemoglobin")
 POINTS = 1000
 MEANING = (
     "A value is the share of light along the normal that leaves diffusely, entry transmission included, gloss not:",
@@ -66,7 +65,7 @@ class Source:
     @property
     def refractive_index(self) -> float:
         """Index of refraction of the skin."""
-        return REFRACTIVE_INDEX
+        return self.luts.tissue.refractive_index
 
     @property
     def entry(self) -> float:
@@ -81,7 +80,7 @@ class Source:
     @cached_property
     def cubic(self) -> Grid:
         """The same ranges and warps with `size` nodes along each axis that varies."""
-        axes = {name: getattr(self.grid, name) for name in AXES}
+        axes = {axis.name: axis for axis in self.grid.axes}
         return Grid(**{n: a if a.count == 1 else replace(a, count=self.size) for n, a in axes.items()})
 
     def colors(self, space: str) -> np.ndarray:
@@ -97,13 +96,11 @@ class Source:
     def skins(self) -> np.ndarray:
         """1,000 random skins [1000, 3] (melanin, eumelanin, hemoglobin), even in the axes' warps; fixed seed."""
         t = np.random.default_rng(0).random((POINTS, 3))
-        axes = (getattr(self.grid, name) for name in AXES)
-        return np.stack([axis.unwarp(t[:, k]) for k, axis in enumerate(axes)], axis=1)
+        return np.stack([axis.unwarp(t[:, k]) for k, axis in enumerate(self.grid.axes[::-1])], axis=1)
 
     def coordinates(self, skins: np.ndarray) -> np.ndarray:
         """Warped coordinates in 0 to 1 [N, 3] of skins [N, 3]: what a cube's input R, G, B are."""
-        axes = [getattr(self.grid, name) for name in AXES]
-        return np.stack([axis.warp(skins[:, k]) for k, axis in enumerate(axes)], axis=1)
+        return np.stack([axis.warp(skins[:, k]) for k, axis in enumerate(self.grid.axes[::-1])], axis=1)
 
     def color_error(self, grid: Grid, cells: np.ndarray, space: str = "srgb") -> dict:
         """What a reader of cells [N_h, N_e, N_m, 3] over a grid gets at the random skins against the set's colors."""
@@ -115,9 +112,8 @@ class Source:
         """The presets that the LUTs cover."""
         presets = []
         for name, skin in PRESETS.items():
-            point = skin.melanin, skin.eumelanin, skin.hemoglobin
-            axes = [getattr(self.grid, axis) for axis in AXES]
-            if all(axis.low <= value <= axis.high for axis, value in zip(axes, point, strict=True)):
+            if all(axis.low <= getattr(skin, axis.name) <= axis.high for axis in self.grid.axes):
+                point = skin.melanin, skin.eumelanin, skin.hemoglobin
                 profile = self.luts.profile(*point, space="srgb")
                 rings, clamped = expand.normalized(profile.energy)
                 edges = profile.radius_edges_mm

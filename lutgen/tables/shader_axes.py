@@ -86,7 +86,7 @@ def grid_functions(grid: Grid, prefix: str, language: str = "glsl") -> str:
     >>> print(grid_functions(default_grid(4, 3, 2), "color").splitlines()[0])
     const ivec3 color_COUNT = ivec3(4, 3, 2);
     """
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    axes = grid.axes[::-1]
     counts = ", ".join(str(axis.count) for axis in axes)
     count = f"#define {prefix}_COUNT int3({counts})" if language == "hlsl" else (
         f"const ivec3 {prefix}_COUNT = ivec3({counts});")  # fmt: skip
@@ -105,7 +105,7 @@ def javascript(grid: Grid) -> str:
     lines = [
         f"  {axis.name}: {{ low: {_number(axis.low, 'js')}, high: {_number(axis.high, 'js')}, "
         f"warp: (value) => {warp(axis, 'value', 'js')}, unwarp: (t) => {unwarp(axis, 't', 'js')} }},"
-        for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin)
+        for axis in grid.axes[::-1]
     ]
     return "\n".join(["{", *lines, "}"])
 
@@ -120,7 +120,7 @@ def formulas(grid: Grid) -> dict[str, str]:
     return {
         axis.name: f"t = {warp(axis, axis.name, 'text')}"
         + f" ({axis.name} is {axis.low:.9g} throughout)" * (axis.count == 1)
-        for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin)
+        for axis in grid.axes[::-1]
     }
 
 

@@ -15,7 +15,6 @@ from lutgen import color, exports
 from lutgen.cli import main
 from lutgen.errors import InputError
 from lutgen.exports import lookup
-from lutgen.exports import resampled as sources
 from lutgen.tables.axes import Axis, Grid
 from lutgen.tables.lut_set import ColorLut
 
@@ -195,7 +194,7 @@ def test_rings_within_the_stated_error(folder, source):
     stated = json.loads((folder / "manifest.json").read_text())["export"]["error"]["unreal"]["rings"]["largest"]
     grid, worst = source.luts.profile_lut.grid, 0.0
     for skin in source.skins[:100]:
-        place = [float(getattr(grid, name).position(v)) for name, v in zip(sources.AXES, skin, strict=True)]
+        place = [float(axis.position(v)) for axis, v in zip(grid.axes[::-1], skin, strict=True)]
         mix = np.zeros((64, 4))
         for corner in np.ndindex(2, 2, 2):
             node = [min(int(p) + c, n - 1) for p, c, n in zip(place, corner, grid.shape[::-1], strict=True)]

@@ -41,7 +41,7 @@ def pick(stage: Stage, look: Look, x: int, y: int) -> Picked | None:
     if skin[0] <= 0:
         return None
     grid = luts.color_lut.grid
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    axes = grid.axes[::-1]
     m, e, h = (float(np.clip(v, a.low, a.high)) for v, a in zip(skin, axes, strict=True))
     columns = [np.array([v]) for v in (m, e, h)]
     mu = expand.coefficients(luts.paths.wavelength_nm, luts.absorbers, *columns)
