@@ -341,15 +341,15 @@ def test_unitys_importer_uses_the_documented_api_only(folder):
         ("texture.Apply()", "texture.Apply(1, 2, 3)"),
         ("importer.SaveAndReimport();", "importer.SaveAndReimport()"),
         ("LoadAssetAtPath<Texture3D>(color)", "LoadAssetAtPath<Texture4D>(color)"),
-        ("found.r -", "found.red -"),
+        ("texel.r -", "texel.red -"),
         ("export.profiles)", "export.presets)"),
         ("Number(words[0])", "Number(words[0], 1)"),
         ("multiplier.floatValue", "multiplier.singleValue"),
         ("new Texture3D(size, size, size, TextureFormat.RGBAHalf, false)", "new Texture3D(size, size, size)"),
         ('MenuItem("Tools', 'MenuEntry("Tools'),
         (
-            "(Texture3D made, string path)\n    {",
-            "(Texture3D made, string path)\n    {\n        Renderer other = null;",
+            "(Texture3D cube, string path)\n    {",
+            "(Texture3D cube, string path)\n    {\n        Renderer other = null;",
         ),
     ],
 )

@@ -87,10 +87,10 @@ public static class LutgenImporter
             int x = (corner & 1) * (export.size[0] - 1);
             int y = (corner >> 1 & 1) * (export.size[1] - 1);
             int z = (corner >> 2) * (export.size[2] - 1);
-            Color found = color.GetPixel(x, y, z);
-            float off = Mathf.Abs(found.r - export.corners[3 * corner]);
-            off = Mathf.Max(off, Mathf.Abs(found.g - export.corners[3 * corner + 1]));
-            off = Mathf.Max(off, Mathf.Abs(found.b - export.corners[3 * corner + 2]));
+            Color texel = color.GetPixel(x, y, z);
+            float off = Mathf.Abs(texel.r - export.corners[3 * corner]);
+            off = Mathf.Max(off, Mathf.Abs(texel.g - export.corners[3 * corner + 1]));
+            off = Mathf.Max(off, Mathf.Abs(texel.b - export.corners[3 * corner + 2]));
             if (!(off < 0.002f))
                 Debug.LogError("lutgen: " + color.name + " differs at texel " + x + ", " + y + ", " + z + "; use LutgenColorCube");
         }
@@ -126,14 +126,14 @@ public static class LutgenImporter
     }
 
     // Into the asset that is there, so that what refers to it keeps it.
-    static void Store(Texture3D made, string path)
+    static void Store(Texture3D cube, string path)
     {
-        made.name = Path.GetFileNameWithoutExtension(path);
+        cube.name = Path.GetFileNameWithoutExtension(path);
         Texture3D there = AssetDatabase.LoadAssetAtPath<Texture3D>(path);
         if (there == null)
-            AssetDatabase.CreateAsset(made, path);
+            AssetDatabase.CreateAsset(cube, path);
         else
-            EditorUtility.CopySerialized(made, there);
+            EditorUtility.CopySerialized(cube, there);
     }
 
     // By name and by serialized property, for projects without HDRP must compile this too.

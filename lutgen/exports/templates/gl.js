@@ -10,33 +10,33 @@ const looking = (from, to) => {
 };
 
 function program(gl, vertex, fragment) {
-  const made = gl.createProgram();
+  const linked = gl.createProgram();
   for (const [kind, name] of [[gl.VERTEX_SHADER, vertex + ".vert"], [gl.FRAGMENT_SHADER, fragment + ".frag"]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, "#version 300 es\n" + data.chunk + data.shaders[name]);
     gl.compileShader(shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(name + ": " + gl.getShaderInfoLog(shader));
-    gl.attachShader(made, shader);
+    gl.attachShader(linked, shader);
   }
-  ["position", "normal", "corner", "sky"].forEach((name, i) => gl.bindAttribLocation(made, i, name));
-  gl.linkProgram(made);
-  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
-  return made;
+  ["position", "normal", "corner", "sky"].forEach((name, i) => gl.bindAttribLocation(linked, i, name));
+  gl.linkProgram(linked);
+  if (!gl.getProgramParameter(linked, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(linked));
+  return linked;
 }
 
 function texture(gl, kind, filter, upload) {
-  const made = gl.createTexture();
-  gl.bindTexture(kind, made);
+  const handle = gl.createTexture();
+  gl.bindTexture(kind, handle);
   for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R]) gl.texParameteri(kind, axis, gl.CLAMP_TO_EDGE);
   gl.texParameteri(kind, gl.TEXTURE_MAG_FILTER, filter);
   gl.texParameteri(kind, gl.TEXTURE_MIN_FILTER, filter);
   upload();
-  return made;
+  return handle;
 }
 
 // A KTX2 file of one level in half floats; where its parts lie: KTX 2.0, section 3.
 function ktx2(gl, file) {
-  const head = new DataView(file), [width, height, depth] = [20, 24, 28].map((at) => head.getUint32(at, true));
+  const head = new DataView(file), [width, height, depth] = [20, 24, 28].map((byte) => head.getUint32(byte, true));
   const start = Number(head.getBigUint64(80, true)), texels = new Uint16Array(file.slice(start));
   return depth
     ? texture(gl, gl.TEXTURE_3D, gl.LINEAR, () =>
@@ -48,11 +48,11 @@ function ktx2(gl, file) {
 async function picture(gl, name) {
   const options = { colorSpaceConversion: "none", premultiplyAlpha: "none" };
   const image = await createImageBitmap(new Blob([bytes(data.pictures[name])], { type: "image/jpeg" }), options);
-  const made = texture(gl, gl.TEXTURE_2D, gl.LINEAR, () =>
+  const uploaded = texture(gl, gl.TEXTURE_2D, gl.LINEAR, () =>
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, image));
   gl.generateMipmap(gl.TEXTURE_2D);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
-  return made;
+  return uploaded;
 }
 
 const half = (gl, width, height) => texture(gl, gl.TEXTURE_2D, gl.NEAREST, () =>
@@ -61,41 +61,41 @@ const depths = (gl, width, height) => texture(gl, gl.TEXTURE_2D, gl.NEAREST, () 
   gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, width, height));
 
 function target(gl, width, height, count, depth) {
-  const made = { frame: gl.createFramebuffer(), width, height, depth, colors: [] };
-  gl.bindFramebuffer(gl.FRAMEBUFFER, made.frame);
+  const buffers = { frame: gl.createFramebuffer(), width, height, depth, colors: [] };
+  gl.bindFramebuffer(gl.FRAMEBUFFER, buffers.frame);
   for (let i = 0; i < count; i++) {
-    made.colors.push(half(gl, width, height));
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, made.colors[i], 0);
+    buffers.colors.push(half(gl, width, height));
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, buffers.colors[i], 0);
   }
   if (depth) gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, depth, 0);
-  gl.drawBuffers(count ? made.colors.map((_, i) => gl.COLOR_ATTACHMENT0 + i) : [gl.NONE]);
+  gl.drawBuffers(count ? buffers.colors.map((_, i) => gl.COLOR_ATTACHMENT0 + i) : [gl.NONE]);
   if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE) throw new Error("no half-float targets");
-  return made;
+  return buffers;
 }
 
 function forget(gl, old) {
   if (!old) return;
-  [...old.colors, old.depth].forEach((one) => one && gl.deleteTexture(one));
+  [...old.colors, old.depth].forEach((held) => held && gl.deleteTexture(held));
   gl.deleteFramebuffer(old.frame);
 }
 
 // One draw: `values` by name are numbers, vectors, matrices, or [kind, texture].
-function draw(gl, made, into, values, corners, vao = null) {
+function draw(gl, shaders, into, values, corners, vao = null) {
   gl.bindFramebuffer(gl.FRAMEBUFFER, into ? into.frame : null);
   gl.viewport(0, 0, into ? into.width : canvas.width, into ? into.height : canvas.height);
-  gl.useProgram(made);
+  gl.useProgram(shaders);
   gl.bindVertexArray(vao);
   let place = 0;
   for (const [name, value] of Object.entries(values)) {
-    const at = gl.getUniformLocation(made, name);
+    const location = gl.getUniformLocation(shaders, name);
     if (Array.isArray(value) && value[1] instanceof WebGLTexture) {
       gl.activeTexture(gl.TEXTURE0 + place);
       gl.bindTexture(value[0], value[1]);
-      gl.uniform1i(at, place++);
+      gl.uniform1i(location, place++);
     } else if (typeof value === "number") {
-      if (name === "frame") gl.uniform1i(at, value); else gl.uniform1f(at, value);
-    } else if (value.length === 16) gl.uniformMatrix4fv(at, false, value);
-    else gl["uniform" + value.length + "fv"](at, value);
+      if (name === "frame") gl.uniform1i(location, value); else gl.uniform1f(location, value);
+    } else if (value.length === 16) gl.uniformMatrix4fv(location, false, value);
+    else gl["uniform" + value.length + "fv"](location, value);
   }
   if (vao) gl.drawElements(gl.TRIANGLES, corners, gl.UNSIGNED_SHORT, 0); else gl.drawArrays(gl.TRIANGLES, 0, 3);
 }

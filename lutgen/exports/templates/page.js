@@ -17,10 +17,10 @@ const unpacked = async (name) => {
 };
 // Differences, one component after the other: summed up and woven together again.
 const summed = async (name, Kind, parts) => {
-  const found = new Kind(await unpacked(name)), out = new Kind(found.length), count = found.length / parts;
+  const differences = new Kind(await unpacked(name)), out = new Kind(differences.length), count = differences.length / parts;
   for (let part = 0; part < parts; part++) {
     const sum = new Kind(1);
-    for (let i = 0; i < count; i++) { sum[0] += found[part * count + i]; out[i * parts + part] = sum[0]; }
+    for (let i = 0; i < count; i++) { sum[0] += differences[part * count + i]; out[i * parts + part] = sum[0]; }
   }
   return out;
 };
@@ -64,7 +64,7 @@ async function start() {
     throw new Error("This page needs half-float render targets, which this graphics driver does not offer.");
   }
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-  const made = {
+  const programs = {
     shadow: program(gl, "shadow", "shadow"), head: program(gl, "head", "head"), row: program(gl, "screen", "row"),
     gather: program(gl, "screen", "gather"), finish: program(gl, "screen", "finish"),
   };
@@ -76,7 +76,7 @@ async function start() {
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_COMPARE_FUNC, gl.LEQUAL);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
-  const flat = (one) => [gl.TEXTURE_2D, one], lut = [gl.TEXTURE_3D, color];
+  const flat = (image) => [gl.TEXTURE_2D, image], lut = [gl.TEXTURE_3D, color];
   let scene = null, sum = null;
 
   function resize() {
@@ -115,29 +115,29 @@ async function start() {
     gl.enable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, shadow.frame);
     gl.clear(gl.DEPTH_BUFFER_BIT);
-    draw(gl, made.shadow, shadow, { light_view }, head.corners, head.vao);
+    draw(gl, programs.shadow, shadow, { light_view }, head.corners, head.vao);
     gl.bindFramebuffer(gl.FRAMEBUFFER, scene.frame);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    draw(gl, made.head, scene, {
+    draw(gl, programs.head, scene, {
       view, projection, light_view, center: [2 * jitter[0] / width, 2 * jitter[1] / height], skin, key,
       mapped: Number($("#mapped").checked), pigments: flat(pigments), bumps: flat(bumps), shadow: flat(shadow.depth),
     }, head.corners, head.vao);
     gl.disable(gl.DEPTH_TEST);
     if (state.frame === 0) {
-      draw(gl, made.row, row, { profile: flat(profile), skin });
+      draw(gl, programs.row, row, { profile: flat(profile), skin });
       gl.bindFramebuffer(gl.FRAMEBUFFER, sum.frame);
       gl.clear(gl.COLOR_BUFFER_BIT);
     }
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE);
     const [entering, surface, place, gloss] = scene.colors.map(flat);
-    draw(gl, made.gather, sum, {
+    draw(gl, programs.gather, sum, {
       entering, surface, place, gloss, row: flat(row.colors[0]), lut, focal, frame: state.frame,
       middle: [width / 2 + jitter[0], height / 2 + jitter[1]], scatters: Number($("#scatters").checked),
     });
     gl.disable(gl.BLEND);
-    draw(gl, made.finish, null, { sum: flat(sum.colors[0]), lut, skin, swatch: swatch() });
+    draw(gl, programs.finish, null, { sum: flat(sum.colors[0]), lut, skin, swatch: swatch() });
     if (state.frame === 0) tell();
     state.frame += 1;
     document.body.dataset.frames = state.frame;
