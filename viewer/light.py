@@ -1,14 +1,20 @@
-"""GLSL constants of the studio and of what leaves the skin."""
+"""What the surface's shader takes from the host: constants of the studio, optics of the skin's surface."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from lutgen.scene.light import STUDIO, exit_means
+from lutgen.scene import surface
+from lutgen.scene.light import STUDIO
+
+
+def texts(n: float) -> dict[str, str]:
+    """Texts by the names that surface.frag.glsl includes, for a skin of refractive index n."""
+    return {"constants.glsl": constants(), "surface.cl": surface.glsl(n)}
 
 
 def constants() -> str:
-    """GLSL constants of the studio and of what leaves the skin."""
+    """GLSL constants of the studio."""
     ways = [np.array(way) / np.linalg.norm(way) for way, _, _ in STUDIO]
     count = len(STUDIO)
 
@@ -20,6 +26,4 @@ def constants() -> str:
         f"const float STUDIO_SHARPNESS[{count}] = float[]({', '.join(f'{s:.1f}' for _, s, _ in STUDIO)});",
         f"const vec3 STUDIO_DIRECTION[{count}] = vec3[]({vectors(ways)});",
         f"const vec3 STUDIO_COLOR[{count}] = vec3[]({vectors(c for _, _, c in STUDIO)});",
-        f"const int EXIT_MEANS = {len(exit_means())};",
-        f"const float EXIT_MEAN[EXIT_MEANS] = float[]({', '.join(f'{m:.9g}' for m in exit_means())});",
     ])  # fmt: skip

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from lutgen.tables.lut_set import LutSet
 
-from . import gl, light, textures
+from . import gl, textures
 
 _LIGHT_SKIN = (0.0127, 0.7, 0.0077)
 
@@ -24,8 +24,7 @@ class Side:
 def upload(luts: LutSet) -> Side:
     """A side that shows a set as it is stored."""
     uploaded = textures.upload(luts)
-    texts = {"functions.glsl": uploaded.functions, "constants.glsl": light.constants()}
-    return Side(luts, luts, uploaded, gl.full_screen("gather.frag.glsl", texts))
+    return Side(luts, luts, uploaded, gl.full_screen("gather.frag.glsl", {"functions.glsl": uploaded.functions}))
 
 
 def one_burley(plain: Side) -> Side:

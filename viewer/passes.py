@@ -11,7 +11,7 @@ from lutgen import color
 from lutgen.errors import in_range
 from lutgen.files import texture_maps
 from lutgen.head import pores
-from lutgen.scene import environment
+from lutgen.scene import environment, surface
 from lutgen.scene import light as lighting
 from lutgen.scene import look as looks
 from lutgen.scene.look import Look
@@ -135,15 +135,16 @@ def draw_surface(
     around = stage.environment_map
     gl.bind(program, normal_map=stage.maps["normal"], chromophore_map=stage.maps["chromophores"],
             surface_map=stage.maps["surface"], detail_map=stage.maps["detail"], pore_map=stage.maps["pores"],
-            shadow_map=stage.targets["cast"], environment_map=stage.ggx if around is None else around,
-            ggx_albedo=stage.ggx, **more)  # fmt: skip
+            shadow_map=stage.targets["cast"], environment_map=stage.lobe_table if around is None else around,
+            lobe_table=stage.lobe_table, **more)  # fmt: skip
     gl.put(
         program, view=camera.view, clip=clip, light_clip=_light_clip(stage, look),
         shadow_offset_mm=0.6, light_range_mm=3 * stage.radius_mm, pore_side_mm=pores.SIDE_MM,
         light_direction=looks.light_direction(look), light_color=look.light * lighting.SUN, eye=camera.eye_mm,
         roughness=look.roughness, specular=look.specular, bumps=look.bumps, entry=look.entry,
         transmission=look.transmission, light_radius=np.tan(np.radians(look.light_size)) * 0.06, shadow_bias=0.0016,
-        environment_entry=lighting.entry_of_the_sky(), environment=look.environment, irradiance_sh=stage.irradiance,
+        environment_entry=surface.entry_of_the_sky(stage.refractive_index), environment=look.environment,
+        irradiance_sh=stage.irradiance,
         environment_levels=0 if around is None else environment.LEVELS,
         environment_turn=tuple(f(np.radians(look.environment_azimuth)) for f in (np.cos, np.sin)),
         from_skin=from_skin(stage, look), **skin_of(stage, look),

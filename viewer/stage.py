@@ -9,7 +9,7 @@ import numpy as np
 
 from lutgen.errors import InputError
 from lutgen.head import pores
-from lutgen.scene import environment
+from lutgen.scene import environment, surface
 from lutgen.scene import light as lighting
 from lutgen.tables.lut_set import LutSet
 
@@ -45,12 +45,17 @@ class Stage:
     maps: dict
     irradiance: np.ndarray
     environment_map: moderngl.Texture | None
-    ggx: moderngl.Texture
+    lobe_table: moderngl.Texture
     timer: clock.Clock
     targets: dict = field(default_factory=dict)
     oxygenation: float | None = None
     full_contrast_melanin: float = 0.0292
     cast: np.ndarray | None = None
+
+    @property
+    def refractive_index(self) -> float:
+        """Of the skin that the stage's LUT set was traced in; the surface of another set's half is this one too."""
+        return float(self.sides["none"].luts.manifest["trace"]["n"])
 
     @property
     def milliseconds(self) -> dict[str, float]:
@@ -63,22 +68,22 @@ def upload(
 ) -> Stage:
     """Upload a head (positions_mm, normals, uv, triangles), its maps [rows, columns, channels], a LUT set, another."""
     context = gl.context()
-    constants = {"constants.glsl": light.constants()}
-    surface = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", constants))
+    texts = light.texts(luts.manifest["trace"]["n"])
+    program = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", texts))
     shadow = context.program(gl.splice("shadow.vert.glsl"), gl.splice("shadow.frag.glsl"))
     uv = mesh.uv if mesh.uv is not None else np.zeros((len(mesh.positions_mm), 2))
     vertices = np.concatenate([mesh.positions_mm, mesh.normals, uv], axis=1).astype("f4")
     buffer = context.buffer(vertices.tobytes())
     indices = context.buffer(np.ascontiguousarray(mesh.triangles, "i4").tobytes())
-    head = context.vertex_array(surface, [(buffer, "3f 3f 2f", "position", "normal", "uv")], indices)
+    head = context.vertex_array(program, [(buffer, "3f 3f 2f", "position", "normal", "uv")], indices)
     cast = context.vertex_array(shadow, [(buffer, "3f 20x", "position")], indices)
     center = (mesh.positions_mm.max(axis=0) + mesh.positions_mm.min(axis=0)) / 2
     shown = {name: lut_sides.upload(set_) for name, set_ in (("none", luts), ("set", other)) if set_ is not None}
     stage = Stage(
-        size, shown, surface, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
+        size, shown, program, shadow, gl.full_screen("compose.frag.glsl"), head, cast, (buffer, indices), center,
         float(np.linalg.norm(mesh.positions_mm - center, axis=1).max()),
         {name: _map(maps.get(name), _PLAIN[name]) for name in _MAPS} | {"pores": gl.image(pores.texture(), 1.0)},
-        lighting.studio_irradiance(), None, gl.table(lighting.ggx_albedo()), clock.open_clock(),
+        lighting.studio_irradiance(), None, gl.table(surface.ggx_energy()), clock.open_clock(),
     )  # fmt: skip
     resize(stage, size)
     return stage
@@ -134,7 +139,7 @@ def release(stage: Stage) -> None:
     lut_sides.release(stage.sides)
     compose = stage.compose
     gl.free(
-        *stage.targets.values(), *stage.maps.values(), stage.ggx, stage.head, stage.head_shadow, stage.surface,
+        *stage.targets.values(), *stage.maps.values(), stage.lobe_table, stage.head, stage.head_shadow, stage.surface,
         stage.shadow, *stage.buffers, compose.array, compose.program, compose.corners,
         *([] if stage.environment_map is None else [stage.environment_map]),
     )  # fmt: skip

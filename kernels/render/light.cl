@@ -1,19 +1,10 @@
 // Light at a surface: sun and surroundings with shadow rays, what of it enters, and what the skin reflects.
-//
-// The factors are the viewer's (viewer/shaders/specular.glsl), so that a comparison is one of transport. A surface of
-// look.entry 1 lets in (1 - F(c)) / (1 - F0) of light at cosine c, relative to light along the normal, and out what two
-// rough lobes do not keep, relative to its mean over all directions; with entry 0 both are 1.
+// Its optics are the viewer's (common/surface.cl), so that a comparison is one of transport. With look.entry 1 a surface
+// lets light in and out by `entry_factor` and `exit_factor`; with entry 0 both are 1.
 
-inline float fresnel(float c) {
-    float d = 1.0f - c, square = d * d;
-    return F0 + (1.0f - F0) * square * square * d;
-}
+inline float entering_factor(const scene_t *s, float c) { return mix(1.0f, entry_factor(c), s->view->entry); }
 
-inline float entry_factor(const scene_t *s, float c) {
-    return mix(1.0f, (1.0f - fresnel(c)) / (1.0f - F0), s->view->entry);
-}
-
-// Energy of one lobe at F = 1, and the part that goes with (1 - c)^5.
+// Energy of one lobe, read linearly from the table.
 inline float2 lobe_energy(const scene_t *s, float c, float roughness) {
     float x = clamp(sqrt(c), 0.0f, 1.0f) * (LOBES - 1), y = clamp(roughness, 0.0f, 1.0f) * (LOBES - 1);
     int i = min((int)x, LOBES - 2), j = min((int)y, LOBES - 2);
@@ -21,30 +12,14 @@ inline float2 lobe_energy(const scene_t *s, float c, float roughness) {
     return mix(mix(row[0], row[1], x - i), mix(row[LOBES], row[LOBES + 1], x - i), y - j);
 }
 
-inline float lobe_share(float2 energy) {
-    return (F0 * (energy.x - energy.y) + energy.y) * (1.0f + F0 * (1.0f / energy.x - 1.0f));
-}
-
 // What leaves toward a viewer at cosine c, relative to the mean over all directions.
-inline float exit_factor(const scene_t *s, float c, float roughness) {
-    float at = roughness * (EXIT_MEANS - 1);
-    int low = min((int)at, EXIT_MEANS - 2);
-    float whole = mix(s->view->exit_means[low], s->view->exit_means[low + 1], at - low);
-    return mix(1.0f, (1.0f - lobe_share(lobe_energy(s, c, roughness))) / whole, s->view->entry);
-}
-
-// One GGX lobe times cosine; what its facets hand on among each other comes back as F0 of it.
-inline float lobe(const scene_t *s, float3 n, float3 v, float3 l, float roughness) {
-    float3 h = normalize(v + l);
-    float nl = fmax(dot(n, l), 0.0f), nv = fmax(dot(n, v), 1e-3f), nh = fmax(dot(n, h), 0.0f);
-    float square = roughness * roughness, a2 = square * square, d = nh * nh * (a2 - 1.0f) + 1.0f;
-    float visible = 0.5f / (nl * sqrt(nv * nv * (1.0f - a2) + a2) + nv * sqrt(nl * nl * (1.0f - a2) + a2) + 1e-6f);
-    float single = a2 / (M_PI_F * d * d) * visible * nl * fresnel(fmax(dot(v, h), 0.0f));
-    return single * (1.0f + F0 * (1.0f / lobe_energy(s, nv, roughness).x - 1.0f));
+inline float leaving_factor(const scene_t *s, float c, float roughness) {
+    return mix(1.0f, exit_factor(lobe_energy(s, c, roughness), roughness), s->view->entry);
 }
 
 inline float lobes(const scene_t *s, const surface_t *here, float3 n, float3 v, float3 l) {
-    return mix(lobe(s, n, v, l, here->rough), lobe(s, n, v, l, here->rough2), SECOND_WEIGHT);
+    float c = fmax(dot(n, v), 1e-3f);
+    return specular_lobes(n, v, l, here->rough, here->rough2, lobe_energy(s, c, here->rough), lobe_energy(s, c, here->rough2));
 }
 
 // Radiance of the surroundings from direction d: an equirectangular table read linearly, row 0 on top.
@@ -95,7 +70,7 @@ inline float3 sunlight(const scene_t *s, const surface_t *here, float3 l, uint *
     (*rays)++;
     if (shaded(s, start(here), l)) return 0.0f;
     float c = received * rsqrt(dot(here->relief, here->relief));
-    return view3(s->view->sun_color) * (received * entry_factor(s, c) * M_1_PI_F);
+    return view3(s->view->sun_color) * (received * entering_factor(s, c) * M_1_PI_F);
 }
 
 // Directions that would lead into the skin are mirrored out of it: relief hands its light on.
@@ -116,7 +91,7 @@ inline float3 toward_surroundings(const scene_t *s, const surface_t *here, rng_t
     for (uint i = 0; i < CANDIDATES; i++) {
         float square = ((i * STRIDE) % CANDIDATES + first) * (1.0f / CANDIDATES), sine = sqrt(square), c = sqrt(1.0f - square);
         float3 d = outward(normalize(n * c + (t * x + b * y) * sine), here->smooth);
-        float entering = entry_factor(s, c), strength = entering * sky_strength(s, d);
+        float entering = entering_factor(s, c), strength = entering * sky_strength(s, d);
         sum += strength;
         if (u * sum < strength) {
             u = u * sum / strength;
@@ -158,6 +133,6 @@ inline float3 toward_reflection(const scene_t *s, const surface_t *here, float3 
     float masked = 0.5f * (sqrt(1.0f + a2 * (1.0f - nv * nv) / (nv * nv)) - 1.0f);
     float hidden = 0.5f * (sqrt(1.0f + a2 * (1.0f - nl * nl) / (nl * nl)) - 1.0f);
     float kept = (1.0f + masked) / (1.0f + masked + hidden);
-    *weight = fresnel(vh) * kept * (1.0f + F0 * (1.0f / lobe_energy(s, nv, roughness).x - 1.0f));
+    *weight = fresnel(vh) * kept * recovery(F0, lobe_energy(s, nv, roughness));
     return outward(l, here->smooth);
 }

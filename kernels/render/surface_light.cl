@@ -20,7 +20,7 @@ inline float seen_cosine(float3 n, float3 d) { return clamp(-dot(n, d), 0.01f, 1
 
 // What the surface lets out toward where it is seen from, painted detail included.
 inline float3 shown(const scene_t *s, const surface_t *here, float3 d) {
-    return here->detail * exit_factor(s, fmax(-dot(normalize(here->relief), d), 1e-3f), here->rough);
+    return here->detail * leaving_factor(s, fmax(-dot(normalize(here->relief), d), 1e-3f), here->rough);
 }
 
 // Unit vector along the surface, the way that a ray along d goes.

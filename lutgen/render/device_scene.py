@@ -15,7 +15,7 @@ from lutgen.files.texture_maps import Maps
 from lutgen.head import pores
 from lutgen.head.mesh import Mesh
 from lutgen.render import bvh
-from lutgen.scene import environment, subject
+from lutgen.scene import environment, subject, surface
 from lutgen.scene import light as lighting
 from lutgen.scene import look as looks
 from lutgen.scene.look import Look
@@ -56,7 +56,7 @@ they are drawn by, and what each counts at least, as a share of the mean radianc
 SUNLIT = 0.1
 """Of light that meets skin, about what it sends on."""
 STUDIO_ROWS, MOST_ROWS = 256, 1024
-_LOBES, _EXIT_MEANS = lighting.ggx_albedo().shape[0], len(lighting.exit_means())
+_LOBES = len(surface.ggx_energy())
 
 VIEW = np.dtype(
     [(name, "f4", (3,)) for name in ("eye", "forward", "right", "up", "sun_direction", "sun_color")]
@@ -68,7 +68,7 @@ VIEW = np.dtype(
         for name in ("sun_spread", "environment", "faint", "roughness", "specular", "bumps", "entry", "pore_side_mm")
     ]
     + [(name, "i4") for name in ("columns", "rows", "pore_texels", "environment_rows", "sunny", "around", "bounces")]
-    + [("seed", "u4"), ("exit_means", "f4", (_EXIT_MEANS,))]
+    + [("seed", "u4")]
 )
 """What stays the same over a picture; `view_t` in the kernels."""
 
@@ -120,7 +120,7 @@ def open_stage(
         "vertices": np.concatenate([shape.positions_mm, shape.normals, uv], axis=1).astype("f4"),
         "corners": shape.triangles.astype("i4"), **{f"{name}_map": textures[name] for name in PLAIN},
         "pore_map": pores.texture(), "environment_map": radiance, "sky": _sky(radiance[..., :3], look),
-        "lobe_table": lighting.ggx_albedo().astype("f4"), "waves": waves(luts, look.oxygenation),
+        "lobe_table": surface.ggx_energy().astype("f4"), "waves": waves(luts, look.oxygenation),
     }  # fmt: skip
     return Stage(device, luts, shape, view, {name: ocl.buffer(device, arrays[name]) for name, _ in SCENE}, width)
 
@@ -145,14 +145,18 @@ def _scene_source() -> str:
 def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constants: float):
     """A built kernel over the stage: of the files named and those that they build on, one lane per work-item."""
     fixed = {
-        "W": 1, "WIDTH": stage.width, "WAVES": len(stage.luts.weights), "LOBES": _LOBES, "EXIT_MEANS": _EXIT_MEANS,
-        "F0": float(lighting.fresnel(np.ones(1))[0]), "SECOND_LOBE": lighting.SECOND_LOBE,
-        "SECOND_WEIGHT": lighting.SECOND_WEIGHT, "ENTRY": stage.luts.paths.entry,
+        "W": 1, "WIDTH": stage.width, "WAVES": len(stage.luts.weights), "LOBES": _LOBES,
+        "ENTRY": stage.luts.paths.entry,
         **{name: number for number, name in enumerate(TALLIES)}, "TALLIES": len(TALLIES),
         "PIXELS": _pixels(stage), "CANDIDATES": CANDIDATES, "STRIDE": STRIDE, "SKY_CELLS": SKY_CELLS,
         "TURN_COSINE": float(np.cos(2 * np.pi / CANDIDATES)), "TURN_SINE": float(np.sin(2 * np.pi / CANDIDATES)),
     }  # fmt: skip
-    text = ocl.struct_source(stage.device, (("view_t", VIEW), *structs)) + _scene_source() + ocl.source(*BASE, *names)
+    text = (
+        ocl.struct_source(stage.device, (("view_t", VIEW), *structs))
+        + _scene_source()
+        + surface.opencl(stage.luts.manifest["trace"]["n"])
+        + ocl.source(*BASE, *names)
+    )
     whole = {name: value for name, value in (fixed | constants).items() if isinstance(value, int)}
     reals = {name: value for name, value in (fixed | constants).items() if isinstance(value, float)}
     return ocl.kernel(stage.device, entry, "".join(f"#define {n} {v:.9e}f\n" for n, v in reals.items()) + text, whole)
@@ -240,7 +244,6 @@ def _view(
         "pore_side_mm": pores.SIDE_MM, "columns": size[0], "rows": size[1], "pore_texels": pores.TEXELS,
         "environment_rows": len(radiance), "sunny": look.light > 0, "bounces": bounces,
         "around": (look.environment > 0 and radiance[..., :3].any()) or (look.light > 0 and bounces > 0), "seed": seed,
-        "exit_means": lighting.exit_means(),
     }  # fmt: skip
     for name in PLAIN:
         values[f"{name}_size"] = textures[name].shape[1::-1]

@@ -101,11 +101,6 @@ def test_pictures_are_shown_by_the_viewers_curve(both):
         assert np.abs(255 * display.backdrop(*SIZE[::-1]) - pixels)[beside].max() < 1.1
 
 
-def test_shares_of_the_lobes_are_the_viewers():
-    text = gl.text("specular.glsl")
-    assert f"SECOND_LOBE = {lighting.SECOND_LOBE}, SECOND_WEIGHT = {lighting.SECOND_WEIGHT};" in text
-
-
 def still(device, epidermis_mm: float, dermis_mm: float):
     """A walk that leaves where it entered, after paths of given lengths."""
     import pyopencl

@@ -11,7 +11,10 @@ from lutgen import device as ocl
 from lutgen.head.mesh import Mesh
 from lutgen.render import device_scene, flat_exits, flat_walk
 from lutgen.scene import light as lighting
+from lutgen.scene import surface
 from lutgen.scene.look import Look, of_preset
+from lutgen.skin import tissue
+from lutgen.skin.tissue import REFRACTIVE_INDEX
 from lutgen.tables import expand
 
 SIGMAS = 4
@@ -221,8 +224,8 @@ def test_skin_mirrors_skin_that_mirrors_the_sky(walk, samples):
     F is convex, and light goes to and fro more often: 1.4 % at most, measured to 0.15 %."""
     z = (np.arange(4096) + 0.5) / 4096
     f, of_wall = (
-        lighting.fresnel(np.array([np.sqrt(0.5)]))[0],
-        np.mean(lighting.fresnel(z) * np.sqrt(1 - z**2)) * 4 / np.pi,
+        surface.fresnel(np.array([np.sqrt(0.5)]), REFRACTIVE_INDEX)[0],
+        np.mean(surface.fresnel(z, REFRACTIVE_INDEX) * np.sqrt(1 - z**2)) * 4 / np.pi,
     )
     look = replace(FRONT, entry=0, environment=1, light=0, elevation=45, target_mm=(0, 0, 0), roughness=0.15,
                    field_of_view=5.0, melanin=0.5, hemoglobin=0.1)  # fmt: skip
@@ -240,8 +243,8 @@ def test_skin_mirrors_skin_that_mirrors_the_sky(walk, samples):
 @pytest.mark.parametrize("roughness", [0.2, 0.6])
 def test_an_even_sky_is_reflected_as_the_viewer_has_it(azimuth, roughness):
     """The lobes' directions are drawn; their mean weight is the table's share of both lobes."""
-    table, count = lighting.ggx_albedo(), len(lighting.ggx_albedo()) - 1
-    f0, c = float(lighting.fresnel(np.ones(1))[0]), np.cos(np.radians(azimuth))
+    table, count = surface.ggx_energy(), len(surface.ggx_energy()) - 1
+    f0, c = tissue.specular(REFRACTIVE_INDEX), np.cos(np.radians(azimuth))
 
     def share(r: float) -> float:
         i, x = min(int(r * count), count - 1), np.sqrt(c) * count
@@ -249,8 +252,8 @@ def test_an_even_sky_is_reflected_as_the_viewer_has_it(azimuth, roughness):
         whole, part = (np.interp(x, np.arange(count + 1), rows[:, k]) for k in (0, 1))
         return float((f0 * (whole - part) + part) * (1 + f0 * (1 / whole - 1)))
 
-    expected = (1 - lighting.SECOND_WEIGHT) * share(roughness) + lighting.SECOND_WEIGHT * share(
-        max(roughness * lighting.SECOND_LOBE, 0.1)
+    expected = (1 - surface.SECOND_WEIGHT) * share(roughness) + surface.SECOND_WEIGHT * share(
+        max(roughness * surface.SECOND_LOBE, 0.1)
     )
     look = replace(FRONT, entry=0, environment=1, light=0, azimuth=azimuth, roughness=roughness, field_of_view=5.0)
     means = []

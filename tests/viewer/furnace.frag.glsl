@@ -6,7 +6,7 @@
 #include "specular.glsl"
 uniform float roughness;
 uniform int law;                  // 0: one lobe at F = 1; 1: the skin's two lobes with their Fresnel reflectance
-out vec4 pixel;                   // reflected; what environment_lobe promises; Fresnel reflectance of a smooth surface
+out vec4 pixel;                   // reflected; what lobe_share promises; Fresnel reflectance of a smooth surface
 
 const int RADII = 96, TURNS = 64;
 
@@ -26,6 +26,7 @@ vec3 mirrored(vec3 v, float rough, float t, float turn) {
 
 void main() {
     float nv = 0.1 + 0.9 * floor(gl_FragCoord.x) / 15.0, second = roughness * SECOND_LOBE, sum = 0.0;
+    vec2 energy = lobe_energy(nv, roughness), energy2 = lobe_energy(nv, second);
     vec3 n = vec3(0.0, 0.0, 1.0), v = vec3(sqrt(1.0 - nv * nv), 0.0, nv);
     for (int lobe = 0; lobe < 2; lobe++)
         for (int i = 0; i < RADII; i++)
@@ -34,9 +35,10 @@ void main() {
                 vec3 l = mirrored(v, lobe == 0 ? roughness : second, t, turn);
                 if (l.z <= 0.0) continue;
                 float share = 3.0 * (1.0 - t) * (1.0 - t) / float(RADII * TURNS);
-                float light = law == 0 ? ggx(n, v, l, roughness, 1.0, 1.0) : specular_lobes(n, v, l, roughness, second);
+                float light = law == 0 ? ggx(n, v, l, roughness) * recovery(1.0, energy)
+                                       : specular_lobes(n, v, l, roughness, second, energy, energy2);
                 sum += share * light / (density(v, l, roughness) + density(v, l, second));
             }
-    float promised = mix(environment_lobe(lobe_albedo(nv, roughness)), environment_lobe(lobe_albedo(nv, second)), SECOND_WEIGHT);
+    float promised = mix(lobe_share(energy), lobe_share(energy2), SECOND_WEIGHT);
     pixel = vec4(sum, promised, fresnel(nv), 1.0);
 }

@@ -9,8 +9,9 @@ import lutgen
 from lutgen.files.texture_maps import Maps
 from lutgen.head import pores
 from lutgen.head.mesh import Mesh
-from lutgen.scene import light, subject
+from lutgen.scene import subject, surface
 from lutgen.scene.look import Look
+from lutgen.skin.tissue import REFRACTIVE_INDEX, specular
 
 _NAMES = "app", "gl", "passes", "stage"
 app, gl, passes, stages = (importlib.import_module(f"lutgen.viewer.{n}") for n in _NAMES)
@@ -110,8 +111,8 @@ def test_roughness_grows_with_the_slopes_that_became_invisible():
 
 def test_no_black_outlines_and_no_lost_light():
     """What leaves at a cosine, weighted with it, is 1 on the mean; at grazing a rough skin still lets out most."""
-    table, means = light.ggx_albedo(), light.exit_means()
-    f0 = light.fresnel(np.ones(1))
+    table, means = surface.ggx_energy(), surface.exit_means(REFRACTIVE_INDEX)
+    f0 = specular(REFRACTIVE_INDEX)
     root = np.linspace(0, 1, table.shape[1])
     size = len(table)
     for i in range(size // 4, size):
@@ -122,7 +123,9 @@ def test_no_black_outlines_and_no_lost_light():
     assert 0.9 < means[size // 4 :].min() < means[size // 4 :].max() < 1
     whole, part = table[size // 2, round(0.032 * (size - 1))]
     assert 1 - (f0 * (whole - part) + part) > 0.6
-    assert light.exit_mean() == pytest.approx(means[size // 16], abs=0.01)  # a smooth one is Fresnel's
+    assert surface.exit_mean(REFRACTIVE_INDEX) == pytest.approx(
+        means[size // 16], abs=0.01
+    )  # a smooth one is Fresnel's
 
 
 def test_the_detail_of_a_painted_albedo_is_a_ratio_of_colors():

@@ -31,7 +31,8 @@ class Plain:
 def open_plain(stage: Stage, look: Look) -> Plain:
     """The color of a look's skin in a texture, and the program that reads it."""
     context = gl.context()
-    texts = {"constants.glsl": "#define PLAIN_ALBEDO\n" + light.constants()}
+    texts = light.texts(stage.refractive_index)
+    texts["constants.glsl"] = "#define PLAIN_ALBEDO\n" + texts["constants.glsl"]
     program = context.program(gl.splice("surface.vert.glsl"), gl.splice("surface.frag.glsl", texts))
     vertices, indices = stage.buffers
     head = context.vertex_array(program, [(vertices, "3f 3f 2f", "position", "normal", "uv")], indices)

@@ -26,14 +26,6 @@ layout(location = 3) out vec4 reflected_light;  // rgb: specular; a: light on th
 layout(location = 4) out vec4 detail;       // rgb: painted detail times albedo
 #endif
 
-// Light that leaves a rough surface at the cosine of an albedo, relative to the mean over all: all but what it reflects
-// from there inward, so that outlines do not turn black as under a polished surface.
-float exit_factor(vec2 albedo, float roughness) {
-    float at = roughness * float(EXIT_MEANS - 1);
-    int low = min(int(at), EXIT_MEANS - 2);
-    return (1.0 - environment_lobe(albedo)) / mix(EXIT_MEAN[low], EXIT_MEAN[low + 1], at - float(low));
-}
-
 float noise(vec2 p) { return fract(52.9829189 * fract(dot(p, vec2(0.06711056, 0.00583715)))); }
 
 float lit(float facing_light) {
@@ -77,12 +69,12 @@ void main() {
     // What the pixel's slopes vary by too finely to be seen makes it rougher.
     float unseen = strength * strength * relief.w + bumps * bumps * 2.0 * (1.0 - mapped.w);
     float rough = rougher(clamp(roughness * surface.x, 0.15, 1.0), unseen), rough2 = rougher(clamp(roughness * surface.x * SECOND_LOBE, 0.1, 1.0), unseen);
-    vec2 albedo = lobe_albedo(nv, rough);
+    vec2 energy = lobe_energy(nv, rough), energy2 = lobe_energy(nv, rough2);
 
     vec3 hidden = open * from_skin;  // skin that hides the sky lies about as open as what it hides it from
     vec3 sky = mix(hidden, irradiance(mapped.xyz), open) * mix(1.0, environment_entry, entry);
     entering = vec4(sun * received * mix(1.0, entry_factor(nl), entry) + sky, -view_position.z);
-    facing = vec4(normalize(view_normal), mix(1.0, exit_factor(albedo, rough), entry));
+    facing = vec4(normalize(view_normal), mix(1.0, exit_factor(energy, rough), entry));
 
     vec3 ratio = texture(chromophore_map, texcoord).xyz;
     ratio.xz = pow(ratio.xz, contrast);
@@ -90,10 +82,10 @@ void main() {
     detail = texture(detail_map, texcoord);
 
     float grazing = clamp(pow(nv + open, exp2(-16.0 * rough - 1.0)) - 1.0 + open, 0.0, 1.0);
-    vec3 around = mix(reflected(n, v, nv, rough) * environment_lobe(albedo),
-                      reflected(n, v, nv, rough2) * environment_lobe(lobe_albedo(nv, rough2)), SECOND_WEIGHT);
-    around = mix(environment_lobe(albedo) * hidden / 3.14159265, around, grazing);
-    vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2) + around;
+    vec3 around = mix(reflected(n, v, nv, rough) * lobe_share(energy),
+                      reflected(n, v, nv, rough2) * lobe_share(energy2), SECOND_WEIGHT);
+    around = mix(lobe_share(energy) * hidden / 3.14159265, around, grazing);
+    vec3 gloss = sun * specular_lobes(n, v, light_direction, rough, rough2, energy, energy2) + around;
     // Only where the far side is what the light meets first: no glow in nostrils that the nose shades.
     float covered = (light_position.z - textureLod(shadow_map, light_position.xy, 0.0).r) * light_range_mm;
     float behind = transmission * open * max(0.8 * dot(-geometric, light_direction) + 0.2, 0.0) * (1.0 - smoothstep(1.5, 3.0, covered / (surface.w * 32.0 + 1.5)));
