@@ -1,7 +1,10 @@
 """Shared sets, baked once per run; what every test of the viewer must leave behind: nothing."""
 
+import os
 import sys
 from dataclasses import replace
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is there: each worker has one of two cores
 
 import pytest
 
