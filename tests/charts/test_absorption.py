@@ -1,10 +1,10 @@
 """The chart of walks: what each walk must find, how it ends, and what is made of its time."""
 
-import csv
 import re
 
 import numpy as np
 import pytest
+from chart_files import KINDS, rows_of
 
 from lutgen import device as ocl
 from lutgen import solvers
@@ -81,9 +81,8 @@ def test_chart_and_its_numbers(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(absorption, "QUICK", (1.0, 2))
     told = absorption.walks(tmp_path, quick=True)
-    assert {path.name for path in tmp_path.iterdir()} == {f"walks.{kind}" for kind in ("svg", "png", "csv")}
-    with (tmp_path / "walks.csv").open() as file:
-        rows = {(r["preset"], float(r["wavelength_nm"]), r["walk"]): r for r in csv.DictReader(file)}
+    assert {path.name for path in tmp_path.iterdir()} == {f"walks.{kind}" for kind in KINDS}
+    rows = {(r["preset"], float(r["wavelength_nm"]), r["walk"]): r for r in rows_of(tmp_path, "walks")}
     assert set(rows) == {(*place, walk) for place in absorption.PLACES for walk in absorption.WALKS}
     for (_, _, walk), row in rows.items():
         assert walk == "mixed" or abs(float(row["sigmas_off"])) < 4

@@ -1,12 +1,12 @@
 """`lutgen figures`: exact colors of the results of Zhang, Human face rendering: files whole, repeatable and alike."""
 
-import csv
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from chart_files import KINDS, rows_of
 from PIL import Image
 
 from lutgen.charts import drawing
@@ -16,7 +16,6 @@ from lutgen.skin.tissue import PRESETS, Skin, layers, preset
 from lutgen.solvers import adding_doubling, direct
 
 NM = list(spectra.nanometers())
-AT = (420.0, 550.0, 700.0)
 
 
 @pytest.fixture(scope="module")
@@ -29,19 +28,14 @@ def drawn(tmp_path_factory) -> Path:
     return out
 
 
-def rows_of(folder: Path, name: str) -> list[dict]:
-    with (folder / f"{name}.csv").open() as file:
-        return list(csv.DictReader(file))
-
-
 @pytest.mark.parametrize(("absorption", "walk"), [("linear", "albedo"), ("exponential", "mixed")])
 def test_exact_spectra_are_what_the_documents_walk_gives(absorption, walk):
-    skin, at = preset("source-african"), 450.0
-    found = direct.shares(layers(skin, at), photons=400_000, seed=1, absorption=walk)
-    exact = {a: spectra.spectra([skin], a)[0][NM.index(at)] for a in spectra.ABSORPTIONS}
-    assert abs(found.diffuse - exact[absorption]) < 4 * found.diffuse_error
+    skin, nm = preset("source-african"), 450.0
+    walked = direct.shares(layers(skin, nm), photons=400_000, seed=1, absorption=walk)
+    exact = {a: spectra.spectra([skin], a)[0][NM.index(nm)] for a in spectra.ABSORPTIONS}
+    assert abs(walked.diffuse - exact[absorption]) < 4 * walked.diffuse_error
     other = exact[next(a for a in exact if a != absorption)]
-    assert abs(found.diffuse - other) > 20 * found.diffuse_error
+    assert abs(walked.diffuse - other) > 20 * walked.diffuse_error
 
 
 @pytest.mark.parametrize("law", ["source", "donner"])
@@ -49,10 +43,10 @@ def test_exact_spectra_are_what_the_documents_walk_gives(absorption, walk):
 def test_spectra_equal_the_stack_solver(law, epidermis_mm):
     skin = replace(preset("source-asian"), scattering=law, epidermis_mm=epidermis_mm)
     for absorption, more in (("linear", 0), ("exponential", 1)):
-        found = spectra.spectra([skin], absorption)[0]
-        for at in AT:
-            stack = [replace(x, mu_s_per_mm=x.mu_s_per_mm + more * x.mu_a_per_mm) for x in layers(skin, at)]
-            assert found[NM.index(at)] == pytest.approx(adding_doubling.stack(stack)[0], abs=1e-5)
+        reflectance = spectra.spectra([skin], absorption)[0]
+        for nm in (420.0, 550.0, 700.0):
+            stack = [replace(x, mu_s_per_mm=x.mu_s_per_mm + more * x.mu_a_per_mm) for x in layers(skin, nm)]
+            assert reflectance[NM.index(nm)] == pytest.approx(adding_doubling.stack(stack)[0], abs=1e-5)
 
 
 def test_an_unknown_absorption_is_refused():
@@ -78,7 +72,7 @@ def test_sweeps_are_the_documents(parameter, first, last):
 
 def test_every_figure_comes_as_svg_png_and_csv(drawn):
     names = {path.stem for path in drawn.iterdir()}
-    assert {path.name for path in drawn.iterdir()} == {f"{n}.{kind}" for n in names for kind in ("svg", "png", "csv")}
+    assert {path.name for path in drawn.iterdir()} == {f"{n}.{kind}" for n in names for kind in KINDS}
     assert names == {
         "sweep-melanin", "sweep-hemoglobin", "sweep-eumelanin", "skin-types", "scattering-curves", "scattering-colors",
         "presets", "published", "portraits",
@@ -153,7 +147,7 @@ def test_portraits_are_left_out_where_there_is_no_opencl(tmp_path, monkeypatch):
 
 def test_the_same_numbers_give_the_same_bytes(drawn, tmp_path):
     figures.sweep_figure(tmp_path, "hemoglobin", 3)
-    for kind in ("svg", "png", "csv"):
+    for kind in KINDS:
         name = f"sweep-hemoglobin.{kind}"
         assert (tmp_path / name).read_bytes() == (drawn / name).read_bytes()
 

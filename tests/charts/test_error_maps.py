@@ -33,39 +33,39 @@ def domain() -> list[error_maps.ErrorMap]:
     return error_maps.diffusion_errors(True, tell)
 
 
-def of(found: list[error_maps.ErrorMap], name: str) -> error_maps.ErrorMap:
-    (one,) = (m for m in found if m.name.startswith(name))
-    return one
+def of(maps: list[error_maps.ErrorMap], name: str) -> error_maps.ErrorMap:
+    (wanted,) = (m for m in maps if m.name.startswith(name))
+    return wanted
 
 
 @pytest.mark.parametrize("parameter", error_maps.PARAMETERS)
 def test_only_mixed_errs_beyond_its_promise_without_refusing(skins, parameter):
-    found = skins[parameter]
-    assert [m.name.replace(" (", ",").split(",")[0] for m in found] == [
+    maps = skins[parameter]
+    assert [m.name.replace(" (", ",").split(",")[0] for m in maps] == [
         "adding-doubling", "table of exact totals", "path-table", *["direct"] * 3, "dipole", *["multipole"] * 2,
     ]  # fmt: skip
-    for one in found:
-        assert np.isfinite(one.error).all()
-        if one.name.startswith(("dipole", "multipole")):
-            assert one.beyond.any()
-            assert not (one.beyond & ~one.refused).any(), one.name
-            assert np.array_equal(one.beyond, abs(one.error) > 0.10)
+    for m in maps:
+        assert np.isfinite(m.error).all()
+        if m.name.startswith(("dipole", "multipole")):
+            assert m.beyond.any()
+            assert not (m.beyond & ~m.refused).any(), m.name
+            assert np.array_equal(m.beyond, abs(m.error) > 0.10)
         else:
-            assert not one.refused.any()
+            assert not m.refused.any()
     for name in ("adding-doubling", "table of exact totals"):
-        assert not of(found, name).beyond.any()
-    mixed = of(found, "direct (mixed)")
+        assert not of(maps, name).beyond.any()
+    mixed = of(maps, "direct (mixed)")
     assert mixed.beyond.any()
     assert (mixed.error[mixed.beyond] > 0).all()  # mixed absorption errs to the bright side only
 
 
 def test_monte_carlo_keeps_its_promise(skins):
     """5 σ: 2e-4 by chance that one of 336 cells lies beyond; the spread of 144 independent z is 1 within 4 σ of it."""
-    walks = [m for found in skins.values() for m in found if m.name.startswith("direct")]
-    tables = [m for found in skins.values() for m in found if m.name.startswith("path-table")]
-    for one in (*walks, *tables):
-        assert one.z is not None
-        assert abs(one.z).max() < 5
+    walks = [m for maps in skins.values() for m in maps if m.name.startswith("direct")]
+    tables = [m for maps in skins.values() for m in maps if m.name.startswith("path-table")]
+    for m in (*walks, *tables):
+        assert m.z is not None
+        assert abs(m.z).max() < 5
     z = np.concatenate([np.ravel(m.z) for m in walks])
     assert len(z) == 144
     assert abs(z.std() - 1) < 4 / np.sqrt(2 * len(z))
@@ -74,7 +74,7 @@ def test_monte_carlo_keeps_its_promise(skins):
 
 def test_errors_are_what_the_solvers_give(skins):
     """One cell of each map, from the public solvers: at 24 nodes as truth within rounding."""
-    found = skins["melanin"]
+    maps = skins["melanin"]
     for name, give in (
         ("adding-doubling", lambda skin, nm: (adding_doubling, layers(skin, nm), {})),
         ("dipole", lambda skin, nm: (dipole, [error_maps.mixed_layer(skin, nm)], {"unsafe": True})),
@@ -82,15 +82,15 @@ def test_errors_are_what_the_solvers_give(skins):
         ("multipole, epidermis 0.25",
          lambda skin, nm: (multipole, layers(replace(skin, epidermis_mm=0.25), nm), {"unsafe": True})),
     ):  # fmt: skip
-        one = of(found, name)
+        m = of(maps, name)
         j, i = 4, 8
-        skin = replace(preset("intermediate"), melanin=float(error_maps.centers(one.y)[j]))
-        solver, stack, options = give(skin, float(error_maps.centers(one.x)[i]))
+        skin = replace(preset("intermediate"), melanin=float(error_maps.centers(m.y)[j]))
+        solver, stack, options = give(skin, float(error_maps.centers(m.x)[i]))
         nodes = error_maps.TRUTH_NODES if solver is adding_doubling else adding_doubling.NODES
         truth = adding_doubling.reflectance(stack, nodes=nodes).diffuse
-        assert one.error[j, i] == pytest.approx(solver.reflectance(stack, **options).diffuse / truth - 1, abs=1e-11)
+        assert m.error[j, i] == pytest.approx(solver.reflectance(stack, **options).diffuse / truth - 1, abs=1e-11)
         refused = "unsafe" in options and error_maps._refuses(solver, stack)
-        assert bool(one.refused[j, i]) == refused
+        assert bool(m.refused[j, i]) == refused
 
 
 def test_truth_is_converged():
@@ -132,7 +132,7 @@ def test_the_mixed_layer_is_the_skins_mean_at_the_best_depth(monkeypatch):
     p95 = {}
     for depth in (0.75 * error_maps.MIXED_DEPTH_MM, error_maps.MIXED_DEPTH_MM, error_maps.MIXED_DEPTH_MM / 0.75):
         monkeypatch.setattr(error_maps, "MIXED_DEPTH_MM", depth)
-        rows = [[[error_maps.mixed_layer(one, float(nm))] for one in people] for nm in rule.wavelength_nm]
+        rows = [[[error_maps.mixed_layer(skin, float(nm))] for skin in people] for nm in rule.wavelength_nm]
         off = color.delta_e00(color.lab(error_maps.exact(rows, 8).T @ rule.xyz_weights), truth)
         p95[depth] = float(np.percentile(off, 95))
     assert min(p95, key=lambda depth: p95[depth]) == 0.24
@@ -140,52 +140,52 @@ def test_the_mixed_layer_is_the_skins_mean_at_the_best_depth(monkeypatch):
 
 
 def test_refusals_are_the_documented_limits(domain):
-    def at(one: error_maps.ErrorMap):
-        return error_maps.centers(one.x)[None], error_maps.centers(one.y)[:, None]
+    def axes_of(m: error_maps.ErrorMap):
+        return error_maps.centers(m.x)[None], error_maps.centers(m.y)[:, None]
 
     by_g, by_n, near_1, over, under, near_2 = domain
-    g, a = at(by_g)
+    g, a = axes_of(by_g)
     assert np.array_equal(by_g.refused, (g < 0) | (a < 0.94))
-    n, a = at(by_n)
+    n, a = axes_of(by_n)
     least = np.array([dipole.least_albedo(float(v)) for v in n[0]])
     assert np.array_equal(by_n.refused, (n > 1.6) | (a < least))
-    t, a = at(over)
+    t, a = axes_of(over)
     assert np.array_equal(over.refused, (t < 1) | (a < 0.94))
-    t, a = at(under)
+    t, a = axes_of(under)
     assert np.array_equal(under.refused, (t < 1) | (a < 0.92))
-    for one in (near_1, near_2):
-        r, a = at(one)
-        assert np.array_equal(one.refused, (r < 1) | (a < 0.94))
-    for one in domain:
-        assert 0 < one.refused.sum() < one.refused.size
-        assert not (one.beyond & ~one.refused).any()
-    for one in (by_g, by_n, over, under):
-        assert one.beyond.any()  # so that the limits are no idle ones
+    for m in (near_1, near_2):
+        r, a = axes_of(m)
+        assert np.array_equal(m.refused, (r < 1) | (a < 0.94))
+    for m in domain:
+        assert 0 < m.refused.sum() < m.refused.size
+        assert not (m.beyond & ~m.refused).any()
+    for m in (by_g, by_n, over, under):
+        assert m.beyond.any()  # so that the limits are no idle ones
 
 
 def test_the_dipoles_map_is_its_closed_form(domain):
     """Jensen 2001, the diffuse reflectance under equation 6, over albedo and index, against adding-doubling."""
-    one = domain[1]
-    for i, n in enumerate(error_maps.centers(one.x)):
-        a = error_maps.centers(one.y)[[0, 7, -1]]
+    m = domain[1]
+    for i, n in enumerate(error_maps.centers(m.x)):
+        a = error_maps.centers(m.y)[[0, 7, -1]]
         inside = -1.440 / n**2 + 0.710 / n + 0.668 + 0.0636 * n
         root = np.sqrt(3 * (1 - a))
         form = a / 2 * (1 + np.exp(-4 / 3 * (1 + inside) / (1 - inside) * root)) * np.exp(-root)
         form *= 1 - ((n - 1) / (n + 1)) ** 2
         truth = [adding_doubling.stack([Layer(INF, 1 - v, 4 * v, 0.75, n)])[0] for v in a]
-        assert one.error[[0, 7, -1], i] == pytest.approx(form / truth - 1, abs=1e-9)
+        assert m.error[[0, 7, -1], i] == pytest.approx(form / truth - 1, abs=1e-9)
 
 
 def test_profiles_are_compared_with_direct(domain):
     """Against a walk of another seed: 4 σ of the difference of two shares; nearest the entry light is missing."""
-    one, j, i = domain[2], 13, 6
-    albedo, radius = float(error_maps.centers(one.y)[j]), float(error_maps.centers(one.x)[i])
+    m, j, i = domain[2], 13, 6
+    albedo, radius = float(error_maps.centers(m.y)[j]), float(error_maps.centers(m.x)[i])
     stack, edges = [Layer(INF, 1 - albedo, 4 * albedo, 0.75)], np.array([0.0, radius, INF])
     share = dipole.profile(stack, edges).encircled()[1] - direct.profile(stack, edges, 100_000, 7).encircled()[1]
     leaves = direct.shares(stack, 20_000).diffuse
     sigma = 0.5 / np.sqrt(leaves) * np.sqrt(1 / 8192 + 1 / 100_000)
-    assert abs(one.error[j, i] - share) < 4 * sigma
-    assert one.error[j, i] > 8 * sigma
+    assert abs(m.error[j, i] - share) < 4 * sigma
+    assert m.error[j, i] > 8 * sigma
     for near in (domain[2], domain[5]):
         assert (near.error[:, 0] < 0).all()
         assert int(near.note.split()[1]) < 40
@@ -234,20 +234,20 @@ def test_charts_show_their_maps(skins, domain, tmp_path, monkeypatch):
     )
     words = f"{error_maps.methods(tmp_path, True, tell)}; {error_maps.diffusion(tmp_path, True, tell)}"
     assert "\n" not in words
-    for name, found, panels in zip(
+    for name, maps, panels in zip(
         ("error-melanin", "diffusion-domain"), (skins["melanin"], domain), drawn, strict=True
     ):
         assert all((tmp_path / f"{name}.{kind}").stat().st_size > 10_000 for kind in ("svg", "png", "csv"))
-        for one, panel in zip(found, panels, strict=True):
-            assert np.array_equal(panel.values, abs(one.error))
-            assert panel.outlined is one.beyond
-            assert panel.hatched is one.refused
+        for m, panel in zip(maps, panels, strict=True):
+            assert np.array_equal(panel.values, abs(m.error))
+            assert panel.outlined is m.beyond
+            assert panel.hatched is m.refused
         with (tmp_path / f"{name}.csv").open() as file:
             rows = list(csv.DictReader(file))
-        assert len(rows) == sum(m.error.size for m in found)
-        beyond = sum(int(m.beyond.sum()) for m in found)
+        assert len(rows) == sum(m.error.size for m in maps)
+        beyond = sum(int(m.beyond.sum()) for m in maps)
         assert f"{name}: {beyond} of {len(rows)} cells" in words
-        last = of(found, found[-1].name)
+        last = of(maps, maps[-1].name)
         assert float(rows[-1]["error"]) == pytest.approx(last.error[-1, -1], rel=1e-5)
         assert float(rows[-2]["x_value"]) == pytest.approx(error_maps.centers(last.x)[-2], rel=1e-5)
         assert float(rows[-2]["y_value"]) == pytest.approx(error_maps.centers(last.y)[-1], rel=1e-5)

@@ -1,9 +1,9 @@
 """Where such methods are known to fail: every failure has a law, every law holds, and a broken one is named."""
 
-import csv
 from dataclasses import replace
 
 import pytest
+from chart_files import rows_of
 
 from lutgen.charts.stability import failures
 from lutgen.charts.stability.laws import LAWS
@@ -40,7 +40,6 @@ def test_a_broken_law_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(failures, "LAWS", laws)
     words = failures.table(tmp_path, lambda stage, tally: None)
     assert f"beyond their limit: {', '.join(law.failure for law in laws[:3])};" in words
-    with (tmp_path / "failures.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(tmp_path, "failures")
     assert [(row["failure"], row["law"]) for row in rows] == [(law.failure, law.name) for law in laws]
     assert [float(row["used"]) for row in rows[:2]] == [2, float("inf")]

@@ -1,9 +1,8 @@
 """`lutgen chart`, profiles: what contenders and fitted shapes must obey, and that the picture shows it."""
 
-import csv
-from dataclasses import asdict, fields
 from types import SimpleNamespace
 
+import chart_files
 import numpy as np
 import pytest
 from PIL import Image
@@ -113,12 +112,12 @@ def test_what_is_drawn_hollow_is_what_its_method_refuses(rows):
 def test_walks_approach_the_truth_with_the_root_of_their_photons(truth, method, few):
     tone, runs = "brown", 8
     shape = truth[profile_shapes.TONES.index(tone)]
-    found = {n: np.array([profile_shapes.walk(method, preset(tone), n, seed) for seed in range(11, 11 + runs)])
-             for n in (few, 16 * few)}  # fmt: skip
-    error = {n: profiles.ee_difference(np.diff(P), shape, EDGES).max(axis=1).mean() for n, P in found.items()}
+    within = {n: np.array([profile_shapes.walk(method, preset(tone), n, seed) for seed in range(11, 11 + runs)])
+              for n in (few, 16 * few)}  # fmt: skip
+    error = {n: profiles.ee_difference(np.diff(P), shape, EDGES).max(axis=1).mean() for n, P in within.items()}
     sigma = KOLMOGOROV_SPREAD * np.sqrt(2 / runs)  # of the logarithm of the ratio of two means over runs
     assert abs(np.log(error[few] / error[16 * few]) - np.log(4)) < 4 * sigma
-    many = found[16 * few]
+    many = within[16 * few]
     off = abs(many.mean(axis=0) - profiles.encircled(shape))[:, EDGES >= profiles.COMPARED_FROM_MM].max()
     rules = sum(wavelengths.load(name).profile_error[1] for name in (profile_shapes.RULE, profile_shapes.TRUTH_RULE))
     assert off < 4 * many.std(axis=0, ddof=1).max() / np.sqrt(runs) + rules
@@ -129,8 +128,8 @@ def test_a_walk_is_its_solvers_spectrum_weighed_by_color(method, solver):
     rule, skin = wavelengths.load(profile_shapes.RULE), preset("tan")
     xyz = np.zeros((len(EDGES) - 1, 3))
     for nm, weights in zip(rule.wavelength_nm, rule.xyz_weights, strict=True):
-        found = solver.profile(layers(skin, float(nm)), EDGES, photons=1024, seed=7, wavelength_nm=float(nm))
-        xyz += found.energy[:, None] * weights
+        profile = solver.profile(layers(skin, float(nm)), EDGES, photons=1024, seed=7, wavelength_nm=float(nm))
+        xyz += profile.energy[:, None] * weights
     energy = np.maximum(color.from_xyz(xyz, "acescg"), 0)
     within = np.cumsum(np.vstack([np.zeros(3), energy]), axis=0) / energy.sum(axis=0)
     assert profile_shapes.walk(method, skin, 1024, 7) == pytest.approx(within.T, abs=1e-9)
@@ -140,8 +139,8 @@ def test_the_noise_of_the_truth_is_what_it_is_off_by(truth, monkeypatch):
     off, told = [], []
     for pair in range(6):
         monkeypatch.setattr(profile_shapes, "TRUTH_SEEDS", (201 + 2 * pair, 202 + 2 * pair))
-        found, noise, _ = profile_shapes.truth(8192)
-        off.append(profiles.ee_difference(found, truth, EDGES))
+        shapes, noise, _ = profile_shapes.truth(8192)
+        off.append(profiles.ee_difference(shapes, truth, EDGES))
         told.append(noise)
     # The tones share their photons, so only pairs and channels count as independent.
     sigma = KOLMOGOROV_SPREAD * np.sqrt(2 / (6 * 3))
@@ -153,8 +152,8 @@ def test_an_answer_is_timed_by_the_median_of_its_repeats(monkeypatch):
     clock = iter([0.0, 0.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 7.0, 7.0])
     monkeypatch.setattr(profile_shapes, "time", SimpleNamespace(perf_counter=clock.__next__))
     monkeypatch.setattr(profile_shapes, "_REPEATED_S", 6.0)
-    found, seconds = profile_shapes._timed(lambda: np.ones(1))
-    assert (found.tolist(), seconds) == ([1], 2)
+    answer, seconds = profile_shapes._timed(lambda: np.ones(1))
+    assert (answer.tolist(), seconds) == ([1], 2)
     assert not list(clock)
 
 
@@ -162,13 +161,7 @@ def test_the_chart_comes_as_svg_png_and_csv_of_the_contest(rows, tmp_path, monke
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(profile_shapes, "contest", lambda quick, progress: rows)
     line = profile_shapes.shapes(tmp_path, True)
-    assert {path.name for path in tmp_path.iterdir()} == {f"profiles.{kind}" for kind in ("svg", "png", "csv")}
-    with (tmp_path / "profiles.csv").open() as file:
-        table = list(csv.DictReader(file))
-    assert list(table[0]) == [field.name for field in fields(profile_shapes.Row)]
-    for row, written in zip(rows, table, strict=True):
-        told = {k: f"{v:.6g}" if isinstance(v, float) else str(v) for k, v in asdict(row).items()}
-        assert written == told
+    chart_files.holds_only(tmp_path, "profiles", rows)
     pixels = np.asarray(Image.open(tmp_path / "profiles.png").convert("RGB")).reshape(-1, 3)
     for tone in profile_shapes.TONES:
         exact = np.round(255 * spectra.shades(spectra.spectra([preset(tone)]))[0])[0]

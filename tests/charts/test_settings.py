@@ -1,9 +1,9 @@
 """`lutgen chart`, the settings: each is measured apart from the others, and noise is not taken for an error."""
 
-import csv
 from functools import cache
 from pathlib import Path
 
+import chart_files
 import numpy as np
 import pytest
 
@@ -33,10 +33,8 @@ def drawn(tmp_path_factory) -> tuple[Path, str]:
 
 
 def rows_of(drawn: tuple[Path, str], name: str) -> list[dict]:
-    with (drawn[0] / f"{name}.csv").open() as file:
-        return [
-            {k: v if k in ("rule", "nodes") else _number(v) for k, v in row.items()} for row in csv.DictReader(file)
-        ]
+    rows = chart_files.rows_of(drawn[0], name)
+    return [{k: v if k in ("rule", "nodes") else _number(v) for k, v in row.items()} for row in rows]
 
 
 def _number(cell: str) -> float | str:
@@ -133,7 +131,7 @@ def test_the_far_light_is_what_lies_beyond_a_thousandth():
 
 def test_every_chart_comes_as_svg_png_and_csv(drawn):
     folder, words = drawn
-    assert {path.name for path in folder.iterdir()} == {f"{n}.{kind}" for n in NAMES for kind in ("svg", "png", "csv")}
+    assert {path.name for path in folder.iterdir()} == {f"{n}.{kind}" for n in NAMES for kind in chart_files.KINDS}
     assert "\n" not in words
     assert "wavelengths" in words
     assert "half profiles" in words

@@ -1,11 +1,11 @@
 """Speed against accuracy: what is drawn is what was made, and says so."""
 
-import csv
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from chart_files import rows_of
 
 from lutgen import color
 from lutgen.charts.accuracy import methods, speed
@@ -99,8 +99,7 @@ def test_the_chart_and_its_table_hold_every_run_and_floor(tmp_path: Path):
     pytest.importorskip("matplotlib")
     drawn = sorted(runs(), key=lambda run: not run.method.startswith("path table, 8"))
     speed.draw(tmp_path, drawn, {"interpolation between nodes": (0.17, 0.23)})
-    with (tmp_path / "speed-accuracy.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(tmp_path, "speed-accuracy")
     assert len(rows) == len(drawn) + 1
     assert rows[-1]["floor"] == "interpolation between nodes"
     picture = (tmp_path / "speed-accuracy.svg").read_text()
@@ -136,8 +135,7 @@ def test_what_mixed_costs_rises_with_melanin(walked, tmp_path: Path, monkeypatch
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(absorption_bias, "walks", lambda photons: walked)
     words = absorption_bias.bias(tmp_path, True)
-    with (tmp_path / "mixed-bias.csv").open() as file:
-        cost = {row["preset"]: float(row["delta_e00"]) for row in csv.DictReader(file) if row["preset"]}
+    cost = {row["preset"]: float(row["delta_e00"]) for row in rows_of(tmp_path, "mixed-bias") if row["preset"]}
     assert set(cost) == set(PRESETS)
     fitted = [cost[name] for name in ("very-light", "light", "intermediate", "tan", "brown", "dark")]
     assert fitted == sorted(fitted)

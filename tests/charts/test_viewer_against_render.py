@@ -1,10 +1,9 @@
 """The viewer against a traced picture of the same scene: within its limits, and the chart of what a tier buys."""
 
-import csv
 import importlib
-from dataclasses import asdict, fields
 from types import SimpleNamespace
 
+import chart_files
 import pytest
 
 from lutgen.charts.accuracy import chart, viewer_against_render
@@ -45,12 +44,7 @@ def test_close_up_a_tier_shows(rows):
 def test_the_chart_comes_as_svg_png_and_csv_of_its_rows(rows, tmp_path):
     pytest.importorskip("matplotlib")
     viewer_against_render.draw(tmp_path, rows, EXTENT)
-    assert {path.name for path in tmp_path.iterdir()} == {f"truth.{kind}" for kind in ("svg", "png", "csv")}
-    with (tmp_path / "truth.csv").open() as file:
-        table = list(csv.DictReader(file))
-    assert list(table[0]) == [field.name for field in fields(viewer_against_render.Row)]
-    for row, written in zip(rows, table, strict=True):
-        assert written == {k: f"{v:.6g}" if isinstance(v, float) else str(v) for k, v in asdict(row).items()}
+    chart_files.holds_only(tmp_path, "truth", rows)
     svg = (tmp_path / "truth.svg").read_text()
     for said in ("portrait, 1.3 mm", "close-up, 0.13 mm", "high", "off"):
         assert said in svg

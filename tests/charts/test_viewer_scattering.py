@@ -1,10 +1,9 @@
 """The viewer's chart: errors that the laws measure at costs that the bench measures, or a line that says why not."""
 
-import csv
 import importlib
-from dataclasses import asdict, fields
 from types import SimpleNamespace
 
+import chart_files
 import pytest
 
 from lutgen.charts.accuracy import chart, viewer_scattering
@@ -52,21 +51,16 @@ def test_more_taps_help_the_skins_own_profile_and_not_anothers(rows):
 
 
 def test_on_its_own_tone_one_burley_is_as_good_as_the_shape_allows():
-    found = viewer_scattering.errors(COSTS[-1:], EXTENT | {"tones": ("very-light",)})
+    own, burley = viewer_scattering.errors(COSTS[-1:], EXTENT | {"tones": ("very-light",)})
     assert (
-        2 * max(viewer_scattering._ee(found[0])) < max(viewer_scattering._ee(found[1])) < 0.06
+        2 * max(viewer_scattering._ee(own)) < max(viewer_scattering._ee(burley)) < 0.06
     )  # lutgen/solvers/README.md, Burley: .02 to .06 for skin tones
 
 
 def test_the_chart_comes_as_svg_png_and_csv_of_its_rows(rows, tmp_path):
     pytest.importorskip("matplotlib")
     viewer_scattering.draw(tmp_path, rows, "some renderer", EXTENT)
-    assert {path.name for path in tmp_path.iterdir()} == {f"viewing.{kind}" for kind in ("svg", "png", "csv")}
-    with (tmp_path / "viewing.csv").open() as file:
-        table = list(csv.DictReader(file))
-    assert list(table[0]) == [field.name for field in fields(viewer_scattering.Row)]
-    for row, written in zip(rows, table, strict=True):
-        assert written == {k: f"{v:.6g}" if isinstance(v, float) else str(v) for k, v in asdict(row).items()}
+    chart_files.holds_only(tmp_path, "viewing", rows)
     svg = (tmp_path / "viewing.svg").read_text()
     for said in ("some renderer", "medium", "high", "one Burley, 0.05 mm", "profile per pixel, 0.5 mm"):
         assert said in svg

@@ -48,9 +48,9 @@ def test_variances_add_with_squared_weights(draft):
     mu = expand.coefficients(draft.paths.wavelength_nm, draft.absorbers, *(np.array([v]) for v in skin))
     total, rings = (table.std_error(*mu)[:, :, 0] ** 2 for table in (draft.totals, draft.paths))
     weights = draft.weights
-    for variance, found in ((total, draft.color_std_error(*skin)), (rings, draft.profile(*skin).std_error)):
+    for variance, std_error in ((total, draft.color_std_error(*skin)), (rings, draft.profile(*skin).std_error)):
         expected = np.sqrt(sum(v[:, None] * w**2 for v, w in zip(variance, weights, strict=True)))
-        assert found == pytest.approx(expected, rel=1e-12)
+        assert std_error == pytest.approx(expected, rel=1e-12)
 
 
 def test_files_and_folders_are_synced_by_the_system(draft, tmp_path, monkeypatch):
