@@ -24,8 +24,8 @@ EXAMPLES = (
     "lutgen maps albedo.exr --out maps --format exr --balance none --exposure 0.5 --eumelanin 0.7 --target dark",
 )
 GAINS, STOPS = (0.01, 100.0), (-8.0, 8.0)
-_MANY = 0.2
-"""Share of texels out of reach that is said."""
+_OUT_OF_REACH = 0.2
+"""Share of texels out of reach, above which a warning says so."""
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -71,7 +71,8 @@ def run(options: Namespace) -> Outcome:
         raise InputError(f"out = {options.out}: holds the albedo {source}, which would go; give another folder")
     clock, seconds = time.perf_counter(), {}
 
-    def _stop(name: str) -> None:
+    def lap(name: str) -> None:
+        """Put down the seconds since the last lap."""
         nonlocal clock
         now = time.perf_counter()
         seconds[name], clock = round(now - clock, 4), now
@@ -82,21 +83,21 @@ def run(options: Namespace) -> Outcome:
         candidates = albedo_to_skin.ratios_of(luts, eumelanin)
         target = None if options.target is None else target_of(luts, options.target)
         painted = albedo.read(source, options.encoding)
-        _stop("read")
+        lap("read")
         tell("fit the light", None)
         doubt = albedo.doubt(luts, painted)
         fit = white_balance.fitted(luts, painted.linear[painted.painted], candidates, start, free)
-        _stop("fit")
+        lap("fit")
         tell("invert", None)
         inversion = albedo_to_skin.invert(luts, painted.linear, fit.eumelanin, fit.gain, painted.painted)
-        _stop("invert")
+        lap("invert")
         residual = maps_folder.statistics(inversion)
         warnings = [warning for warning in (doubt, no_skin(residual, source)) if warning is not None]
         recolored = None
         if target is not None:
             tell("recolor", None)
             recolored = recolor.recolored(luts, inversion, painted.linear, target)
-            _stop("recolor")
+            lap("recolor")
         tell("write", None)
         facts = _facts(luts, painted, inversion, residual, options, target, warnings)
         with folders.whole(options.out, options.force, texture_maps.MADE) as folder:
@@ -104,7 +105,7 @@ def run(options: Namespace) -> Outcome:
             maps_folder.write(folder, layers, options.format, recolored, painted.alpha, facts)
             balanced = painted.linear * inversion.gain
             _preview(folder / "preview.png", luts, balanced, inversion, layers, facts, recolored)
-        _stop("write")
+        lap("write")
     seconds["total"] = round(sum(seconds.values()), 4)
     per_pixel = 1e6 * seconds["invert"] / inversion.painted.size
     result = {"out": str(out), **facts, "seconds": seconds, "invert_us_per_pixel": round(per_pixel, 3)}
@@ -120,7 +121,7 @@ def no_skin(residual: dict, source: Path) -> str | None:
             f"albedo {source}: its colors are those of no skin (ΔE00 {median:.1f} from the nearest at the median; "
             f"allowed is below {NO_SKIN:g}); {check}"
         )
-    if share < _MANY:
+    if share < _OUT_OF_REACH:
         return None
     return f"{share:.0%} of the texels are farther than {maps_folder.REACH:g} from any skin: {check}"
 

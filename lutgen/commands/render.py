@@ -35,8 +35,8 @@ EXAMPLES = (
 )
 SIZE = "512x512"
 INTERRUPTED = 130
-_ODD = 0.01
-"""Share of back faces that is said."""
+_BACK_FACES = 0.01
+"""Share of back faces among what the camera sees, above which a line says so."""
 _NOT_SEEN = ("tier", "split", "transmission", "exposure")
 """Values of a look that a render does not depend on."""
 
@@ -96,7 +96,7 @@ def run(options: Namespace) -> Outcome:
         "head": _hash(head.positions_mm, head.normals, head.uv, head.triangles), "maps": _hash_of(scene.maps),
         "environment": "studio" if scene.surroundings is None else _hash(scene.surroundings),
     }  # fmt: skip
-    before = None if options.force or not out.exists() else _same(film.read(out), recipe, out)
+    before = None if options.force or not out.exists() else _resumed(film.read(out), recipe, out)
     seconds = {"head": time.perf_counter() - start}
     with progress.Progress(options) as tell, _interruptible() as stopped:
         with _timed(seconds, "tree"):
@@ -154,7 +154,7 @@ def _text(result: dict, seen: bool) -> str:
             f"of {photons['entered']} walks {photons['lost']} were lost at folds of the mesh, {photons['unfinished']} "
             "given up for their length"
         )
-    if counts.get("BACKS", 0) > _ODD * counts.get("HITS", 0):
+    if counts.get("BACKS", 0) > _BACK_FACES * counts.get("HITS", 0):
         lines.append(
             f"{100 * counts['BACKS'] / counts['HITS']:.2g} % of what the camera sees are back faces: triangles run "
             "both ways round, or the mesh is open; unify its normals in your editor"
@@ -214,7 +214,7 @@ def _hash_of(maps: Maps) -> str:
     return f"{mark} {maps.full_contrast_melanin:g}"
 
 
-def _same(before, recipe: dict, out: Path):
+def _resumed(before, recipe: dict, out: Path):
     """The picture to go on with; InputError that names what differs where it is of something else."""
     earlier = _flat(before.facts.get("recipe", {}))
     differ = [
