@@ -76,7 +76,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> Outcome:
     """Sample until --spp, --time or --noise, go on where the same command stopped before."""
     from lutgen import device as ocl
-    from lutgen.head import soundness
+    from lutgen.head import mend
     from lutgen.render import device_scene, film, flat_walk, progressive
 
     start = time.perf_counter()
@@ -87,7 +87,7 @@ def run(options: Namespace) -> Outcome:
         folders.check_file("png", options.png, ".png")
     device = ocl.choose(options.device)
     scene = scene_options.scene_of(options, look)
-    head, mends = soundness.mended(scene.head)
+    head, mends = mend.outward(scene.head)
     luts, notes = scene.luts, (*scene.notes, *mends)
     recipe = {
         "lutgen": version("lutgen"), "walk": options.walk, "size": list(size), "seed": seed, "kernels": _kernels(),
@@ -100,7 +100,7 @@ def run(options: Namespace) -> Outcome:
     seconds = {"head": time.perf_counter() - start}
     with progress.Progress(options) as tell, _interruptible() as stopped:
         with _timed(seconds, "tree"):
-            stage = device_scene.open_stage(device, luts, head, scene.maps, look, size, scene.surroundings, seed)
+            stage = device_scene.open_scene(device, luts, head, scene.maps, look, size, scene.surroundings, seed)
         tell("exits", None)
         with _timed(seconds, "exits"):
             walk = flat_walk.WALKS[options.walk](stage, seed)
@@ -108,7 +108,7 @@ def run(options: Namespace) -> Outcome:
         facts = {"recipe": recipe, "walk": walk.facts, "notes": list(notes), "device": device.name}
         picture = film.empty(size, walk.group, facts) if before is None else before
 
-        def save(picture: film.Picture, noise: float) -> None:
+        def save(picture: film.Film, noise: float) -> None:
             """Write what there is so far."""
             film.write(picture, out)
             if options.png:

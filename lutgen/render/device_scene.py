@@ -1,4 +1,4 @@
-"""A stage on the device: head, maps, light and skin as the renderer's kernels read them (kernels/render/scene.cl)."""
+"""A scene on the device: head, maps, light and skin as the renderer's kernels read them (kernels/render/scene.cl)."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ VIEW = np.dtype(
 
 
 @dataclass(frozen=True)
-class Stage:
+class DeviceScene:
     """One head, skin and light on a device; `buffers` by the names of SCENE."""
 
     device: ocl.Device
@@ -95,10 +95,10 @@ class Stage:
         return int(self.view["columns"]), int(self.view["rows"])
 
 
-def open_stage(
+def open_scene(
     device: ocl.Device, luts: LutSet, shape: Mesh, given: Maps, look: Look, size: tuple[int, int],
     around: np.ndarray | None = None, seed: int = 0, bounces: int = 3,
-) -> Stage:  # fmt: skip
+) -> DeviceScene:  # fmt: skip
     """Upload a head, its maps, a skin and its light; InputError where the LUT set does not cover the look's skin.
 
     `around` is radiance as of `environment.read`; None: the studio. Light reflected from skin to skin is followed
@@ -122,16 +122,16 @@ def open_stage(
         "pore_map": pores.texture(), "environment_map": radiance, "sky": _sky(radiance[..., :3], look),
         "lobe_table": surface.ggx_energy().astype("f4"), "waves": waves(luts, look.oxygenation),
     }  # fmt: skip
-    return Stage(device, luts, shape, view, {name: ocl.buffer(device, arrays[name]) for name, _ in SCENE}, width)
+    return DeviceScene(device, luts, shape, view, {name: ocl.buffer(device, arrays[name]) for name, _ in SCENE}, width)
 
 
-def items(stage: Stage, pixels: int) -> int:
+def items(scene: DeviceScene, pixels: int) -> int:
     """Work-items that take that many pixels."""
-    return -(-pixels // _pixels(stage))
+    return -(-pixels // _pixels(scene))
 
 
-def _pixels(stage: Stage) -> int:
-    return PIXELS["gpu" if stage.device.kind == "gpu" else "cpu"]
+def _pixels(scene: DeviceScene) -> int:
+    return PIXELS["gpu" if scene.device.kind == "gpu" else "cpu"]
 
 
 def _scene_source() -> str:
@@ -142,24 +142,24 @@ def _scene_source() -> str:
     return f"#define SCENE {parameters}\n#define SCENE_HERE {{{here}}}\ntypedef struct {{ {fields} }} scene_t;\n"
 
 
-def kernel(stage: Stage, entry: str, *names: str, structs: tuple = (), **constants: float):
-    """A built kernel over the stage: of the files named and those that they build on, one lane per work-item."""
+def kernel(scene: DeviceScene, entry: str, *names: str, structs: tuple = (), **constants: float):
+    """A built kernel over the scene: of the files named and those that they build on, one lane per work-item."""
     fixed = {
-        "W": 1, "WIDTH": stage.width, "WAVES": len(stage.luts.weights), "LOBES": _LOBES,
-        "ENTRY": stage.luts.paths.entry,
+        "W": 1, "WIDTH": scene.width, "WAVES": len(scene.luts.weights), "LOBES": _LOBES,
+        "ENTRY": scene.luts.paths.entry,
         **{name: number for number, name in enumerate(TALLIES)}, "TALLIES": len(TALLIES),
-        "PIXELS": _pixels(stage), "CANDIDATES": CANDIDATES, "STRIDE": STRIDE, "SKY_CELLS": SKY_CELLS,
+        "PIXELS": _pixels(scene), "CANDIDATES": CANDIDATES, "STRIDE": STRIDE, "SKY_CELLS": SKY_CELLS,
         "TURN_COSINE": float(np.cos(2 * np.pi / CANDIDATES)), "TURN_SINE": float(np.sin(2 * np.pi / CANDIDATES)),
     }  # fmt: skip
     text = (
-        ocl.struct_source(stage.device, (("view_t", VIEW), *structs))
+        ocl.struct_source(scene.device, (("view_t", VIEW), *structs))
         + _scene_source()
-        + surface.opencl(stage.luts.manifest["trace"]["n"])
+        + surface.opencl(scene.luts.manifest["trace"]["n"])
         + ocl.source(*BASE, *names)
     )
     whole = {name: value for name, value in (fixed | constants).items() if isinstance(value, int)}
     reals = {name: value for name, value in (fixed | constants).items() if isinstance(value, float)}
-    return ocl.kernel(stage.device, entry, "".join(f"#define {n} {v:.9e}f\n" for n, v in reals.items()) + text, whole)
+    return ocl.kernel(scene.device, entry, "".join(f"#define {n} {v:.9e}f\n" for n, v in reals.items()) + text, whole)
 
 
 def waves(luts: LutSet, oxygenation: float) -> np.ndarray:

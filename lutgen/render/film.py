@@ -1,4 +1,4 @@
-"""A picture that is being rendered: sums of its samples, what they say, and the OpenEXR file that it lives in.
+"""A film that a picture is rendered on: sums of its samples, what they say, and the OpenEXR file that it lives in.
 
 Channels: R, G, B (linear ACEScg radiance, averaged over the whole pixel, black beside the head), mask (share of the
 pixel that the head covers), samples, sigma.R, .G, .B (standard error of R, G, B, from the samples' own spread), and
@@ -24,7 +24,7 @@ _NOISE_PIXELS = 4096
 
 
 @dataclass(frozen=True)
-class Picture:
+class Film:
     """Sums [rows, columns, 10] over `estimates` independent estimates a pixel, of `group` samples each; `facts` say of
     what. Row 0 is on top."""
 
@@ -62,26 +62,26 @@ class Picture:
         return np.sqrt(np.maximum(np.diagonal(self.covariance(), axis1=-2, axis2=-1), 0))
 
 
-def empty(size: tuple[int, int], group: int, facts: dict) -> Picture:
+def empty(size: tuple[int, int], group: int, facts: dict) -> Film:
     """A picture of columns x rows without samples."""
-    return Picture(np.zeros((size[1], size[0], MOMENTS)), 0, group, facts)
+    return Film(np.zeros((size[1], size[0], MOMENTS)), 0, group, facts)
 
 
-def noise_delta_e(made: Picture, exposure: float = 0.0, seed: int = 0) -> float:
+def noise_delta_e(film: Film, exposure: float = 0.0, seed: int = 0) -> float:
     """Mean CIEDE2000 difference that a pixel's noise makes on the skin, from each pixel's own covariance.
 
     4,096 pixels that the head covers wholly, or if none is, those it covers most, the same each time, moved by a random
     error each; white is 1 under the exposure. Infinite before there are two estimates, 0 where no head is.
     """
-    if made.estimates < 2:
+    if film.estimates < 2:
         return float("inf")
-    most = made.mask.max()
+    most = film.mask.max()
     if most == 0:
         return 0.0
-    rows, columns = np.nonzero(made.mask > (1 - 1e-6 if most > 1 - 1e-6 else 0.5 * most))
+    rows, columns = np.nonzero(film.mask > (1 - 1e-6 if most > 1 - 1e-6 else 0.5 * most))
     rng = np.random.default_rng(seed)
     some = rng.permutation(len(rows))[:_NOISE_PIXELS]
-    part = Picture(made.sums[rows[some], columns[some]][None], made.estimates, made.group, {})
+    part = Film(film.sums[rows[some], columns[some]][None], film.estimates, film.group, {})
     mean, covariance = part.rgb[0], part.covariance()[0]
     value, axes = np.linalg.eigh(covariance)
     error = np.einsum("pij,pj->pi", axes, np.sqrt(np.maximum(value, 0)) * rng.standard_normal(mean.shape))
@@ -89,19 +89,19 @@ def noise_delta_e(made: Picture, exposure: float = 0.0, seed: int = 0) -> float:
     return float(color.delta_e00(one, two).mean())
 
 
-def write(made: Picture, path: Path) -> None:
+def write(film: Film, path: Path) -> None:
     """Write the picture under another name, then rename: a file is there whole or as it was before."""
-    n, rgb, sigma = max(made.estimates, 1), made.rgb, made.sigma()
-    channels = {**exr.rgb(rgb), "mask": made.mask, "samples": np.full(made.mask.shape, float(made.samples))}
+    n, rgb, sigma = max(film.estimates, 1), film.rgb, film.sigma()
+    channels = {**exr.rgb(rgb), "mask": film.mask, "samples": np.full(film.mask.shape, float(film.samples))}
     channels |= {f"sigma.{name}": sigma[..., i] for i, name in enumerate("RGB")}
-    channels |= {f"square.{name}": made.sums[..., 4 + i] / n for i, name in enumerate(PRODUCTS)}
-    facts = {"render": made.facts | {"samples": made.samples, "estimates": made.estimates, "group": made.group}}
+    channels |= {f"square.{name}": film.sums[..., 4 + i] / n for i, name in enumerate(PRODUCTS)}
+    facts = {"render": film.facts | {"samples": film.samples, "estimates": film.estimates, "group": film.group}}
     part = exr.Part("render", {name: values.astype("f4") for name, values in channels.items()}, facts)
     with folders.whole_file("out", path) as partial:
         exr.write(partial, [part])
 
 
-def read(path: Path) -> Picture:
+def read(path: Path) -> Film:
     """A picture that `write` wrote; InputError where the file is anything else."""
     try:
         (part,) = exr.read(Path(path)).values()
@@ -111,7 +111,7 @@ def read(path: Path) -> Picture:
         sums = np.stack([part.channels[name] for name in names], axis=-1).astype(float) * n
         if not np.all(np.isfinite(sums)):
             raise ValueError("holds NaN")
-        return Picture(sums, n, int(facts["group"]), facts)
+        return Film(sums, n, int(facts["group"]), facts)
     except (InputError, KeyError, ValueError, TypeError) as error:
         raise InputError(
             f"{path}: not a whole picture of `lutgen render`; give another name, or render it anew"

@@ -12,7 +12,7 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.render import device_scene, distance, sample_queue
-from lutgen.render.device_scene import Stage
+from lutgen.render.device_scene import DeviceScene
 from lutgen.solvers import path_table
 from lutgen.solvers.path_table import Medium
 from lutgen.tables import bake, expand
@@ -106,51 +106,53 @@ def walk(
             setattr(tally, name, getattr(tally, name) + int(results[name].sum()))
 
 
-def flat(on: Stage, seed: int = 0) -> sample_queue.Staged:
+def flat(scene: DeviceScene, seed: int = 0) -> sample_queue.QueueWalk:
     """Full walks under flat skin, exits looked for on the real surface."""
-    return _staged(on, seed, {"walk": "flat-full"}, ())
+    return _queue_walk(scene, seed, {"walk": "flat-full"}, ())
 
 
-def inside(on: Stage, seed: int = 0) -> sample_queue.Staged:
-    """Walks inside the stage's mesh; InputError for one with holes."""
-    depths = distance.of_mesh(on.shape.positions_mm, on.shape.triangles, on.luts.tissue.epidermis_mm, on.device)
+def inside(scene: DeviceScene, seed: int = 0) -> sample_queue.QueueWalk:
+    """Walks inside the scene's mesh; InputError for one with holes."""
+    depths = distance.of_mesh(
+        scene.shape.positions_mm, scene.shape.triangles, scene.luts.tissue.epidermis_mm, scene.device
+    )
     told = {
         "walk": "mesh",
         "depth_cell_mm": depths.spacing_mm,
         "depth_bytes": depths.bytes,
         "notes": list(depths.notes),
     }
-    return _staged(on, seed, told, tuple(distance.buffers(on.device, depths)))
+    return _queue_walk(scene, seed, told, tuple(distance.buffers(scene.device, depths)))
 
 
-def _staged(on: Stage, seed: int, facts: dict, depths: tuple) -> sample_queue.Staged:
+def _queue_walk(scene: DeviceScene, seed: int, facts: dict, depths: tuple) -> sample_queue.QueueWalk:
     tally = Tally()
-    medium, _ = bake.skin_medium(on.luts.tissue, on.luts.paths.wavelength_nm)
-    medium = replace(medium, nu_per_mm=least_absorption(on))
-    waves = device_scene.waves(on.luts, on.luts.oxygenation)
+    medium, _ = bake.skin_medium(scene.luts.tissue, scene.luts.paths.wavelength_nm)
+    medium = replace(medium, nu_per_mm=least_absorption(scene))
+    waves = device_scene.waves(scene.luts, scene.luts.oxygenation)
     waves[:, device_scene.NU] = medium.nu_per_mm
-    here = replace(on, buffers=on.buffers | {"waves": ocl.buffer(on.device, waves)})
+    here = replace(scene, buffers=scene.buffers | {"waves": ocl.buffer(scene.device, waves)})
 
     def step(entries, exits, part: sample_queue.Part) -> int:
         """Walk a part and say how many events that took."""
         before = tally.events
-        walk(medium, entries, exits, part, seed, on.device, tally, depths)
+        walk(medium, entries, exits, part, seed, scene.device, tally, depths)
         facts["photons"] = asdict(tally)
         return tally.events - before
 
-    return sample_queue.staged(here, step, facts, not depths, REACH)
+    return sample_queue.queue_walk(here, step, facts, not depths, REACH)
 
 
-def least_absorption(on: Stage) -> np.ndarray:
+def least_absorption(scene: DeviceScene) -> np.ndarray:
     """The least absorption [K] of any texel's epidermis or dermis, 1/mm: how fast lives may end.
 
     It is linear in melanosome and blood fractions and in the eumelanin ratio, so least where each is least or most.
     """
-    columns, rows = on.view["chromophore_size"]
-    ratios = ocl.read(on.device, on.buffers["chromophore_map"], np.empty((rows, columns, 4), "f2"))[..., :3]
+    columns, rows = scene.view["chromophore_size"]
+    ratios = ocl.read(scene.device, scene.buffers["chromophore_map"], np.empty((rows, columns, 4), "f2"))[..., :3]
     ends = np.stack([ratios.min(axis=(0, 1)), ratios.max(axis=(0, 1))]).astype(float)
-    allowed = on.view["chromophores_low"].astype(float), on.view["chromophores_high"].astype(float)
-    skins = np.clip(on.view["chromophores"] * ends, *allowed)
+    allowed = scene.view["chromophores_low"].astype(float), scene.view["chromophores_high"].astype(float)
+    skins = np.clip(scene.view["chromophores"] * ends, *allowed)
     corners = [skin.ravel() for skin in np.meshgrid(*skins.T, indexing="ij")]
-    mu = expand.coefficients(on.luts.paths.wavelength_nm, on.luts.absorbers, *corners)
+    mu = expand.coefficients(scene.luts.paths.wavelength_nm, scene.luts.absorbers, *corners)
     return 0.999 * np.minimum(mu[0].min(axis=1), mu[1].min(axis=1))  # half floats and shares of texels round

@@ -11,8 +11,8 @@ import numpy as np
 from lutgen import device as ocl
 from lutgen.errors import InputError
 from lutgen.render import film, flat_walk
-from lutgen.render.device_scene import TALLIES, Stage, items
-from lutgen.render.film import Picture
+from lutgen.render.device_scene import TALLIES, DeviceScene, items
+from lutgen.render.film import Film
 from lutgen.render.goal import Goal
 
 LAUNCH_SECONDS = 0.4
@@ -44,25 +44,25 @@ class Tally:
 
 
 def render(
-    stage: Stage, walk: flat_walk.Walk, start: Picture, goal: Goal, save: Callable[[Picture, float], None],
-    stopped: Callable[[], bool] = lambda: False, progress: Callable = lambda stage, tally: None, exposure: float = 0.0,
-) -> tuple[Picture, Tally, float]:  # fmt: skip
+    scene: DeviceScene, walk: flat_walk.Walk, start: Film, goal: Goal, save: Callable[[Film, float], None],
+    stopped: Callable[[], bool] = lambda: False, progress: Callable = lambda scene, tally: None, exposure: float = 0.0,
+) -> tuple[Film, Tally, float]:  # fmt: skip
     """Add samples to a picture until the goal or a stop; returns it, what was done, and its noise in ΔE00.
 
     `save` is given the picture every few seconds and in the end. InputError where the camera looks at back faces.
     """
-    columns, rows = stage.size
-    pixels, device, group = columns * rows, stage.device, walk.group
+    columns, rows = scene.size
+    pixels, device, group = columns * rows, scene.device, walk.group
     tally, begun, rate, cost = Tally(), time.perf_counter(), 2e4, 0.0
     saved = checked = begun
     held_buffer = ocl.buffer(device, np.zeros((pixels, film.MOMENTS), "f4"))
-    tallies = np.zeros((items(stage, pixels), len(TALLIES)), "u4")
+    tallies = np.zeros((items(scene, pixels), len(TALLIES)), "u4")
     tally_buffer = ocl.buffer(device, tallies)
     made, held, noise = start, 0, film.noise_delta_e(start, exposure)
     earlier = start.facts.get("counts", {})
     limit = None if goal.samples is None else -(-goal.samples // group) * group
 
-    def gathered() -> Picture:
+    def gathered() -> Film:
         """The picture with what the device holds, and what was counted for it in all runs."""
         moments = ocl.read(device, held_buffer, np.zeros((pixels, film.MOMENTS), "f4"))
         sums = made.sums + moments.reshape(made.sums.shape)

@@ -14,7 +14,7 @@ import numpy as np
 
 from lutgen import device as ocl
 from lutgen.render import device_scene
-from lutgen.render.device_scene import Stage
+from lutgen.render.device_scene import DeviceScene
 
 ENTRY = np.dtype(
     [("position", "f4", (3,)), ("wavelength", "u4"), ("normal", "f4", (3,)), ("pad", "u4"), ("direction", "f4", (3,)),
@@ -54,16 +54,16 @@ class Part:
     turn: int = 0
 
 
-WalkStage = Callable[[object, object, Part], int]
+PathWalk = Callable[[object, object, Part], int]
 """Turns a buffer of ENTRY into one of EXIT: (entries, exits, what they hold) -> events."""
 
 
 @dataclass
-class Staged:
+class QueueWalk:
     """A way to take samples (walks.Walk) around a stage that walks; `seconds` and `events` add up by stage."""
 
-    stage: Stage
-    walk: WalkStage
+    scene: DeviceScene
+    walk: PathWalk
     kernels: dict[str, object]
     facts: dict
     group: int
@@ -77,20 +77,20 @@ class Staged:
 
     def __call__(self, begin: int, end: int, first: int, samples: int, moments, tallies) -> None:
         """Add samples of pixels begin ... end - 1."""
-        device, scene = self.stage.device, self.stage.arguments
-        places, shape = (end - begin) * samples, (device_scene.items(self.stage, end - begin),)
+        device, arguments = self.scene.device, self.scene.arguments
+        places, shape = (end - begin) * samples, (device_scene.items(self.scene, end - begin),)
         entries, exits, queue = (ocl.buffer(device, kind.itemsize * places) for kind in (ENTRY, EXIT, SAMPLE))
         waiting = np.zeros(shape, "u4")
         waiting_buffer = ocl.buffer(device, waiting)
         numbers = tuple(np.uint32(v) for v in (begin, end, first, samples))
         with self._timed("camera"):
-            ocl.launch(device, self.kernels["aim"], shape, *scene, *numbers, entries, queue, tallies)
-        for turn in range(2 * int(self.stage.view["bounces"]) + 2):
+            ocl.launch(device, self.kernels["aim"], shape, *arguments, *numbers, entries, queue, tallies)
+        for turn in range(2 * int(self.scene.view["bounces"]) + 2):
             with self._timed("walk"):
                 self.events += self.walk(entries, exits, Part(begin, end, first, samples, turn))
             with self._timed("light"):
                 more = np.uint32(turn), entries, exits, queue, tallies, waiting_buffer
-                ocl.launch(device, self.kernels["gather"], shape, *scene, *numbers, *more)
+                ocl.launch(device, self.kernels["gather"], shape, *arguments, *numbers, *more)
             if not ocl.read(device, waiting_buffer, waiting).any():
                 break
         with self._timed("light"):
@@ -103,12 +103,12 @@ class Staged:
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - since
 
 
-def staged(on: Stage, walk: WalkStage, facts: dict, flat: bool, reach: float) -> Staged:
+def queue_walk(scene: DeviceScene, walk: PathWalk, facts: dict, flat: bool, reach: float) -> QueueWalk:
     """Open the stages around a walk; `flat`: exits lie in the tangent plane and are looked for on the real surface."""
-    n = float(on.luts.manifest["trace"]["n"])
+    n = float(scene.luts.manifest["trace"]["n"])
     options = {"REACH": reach, "NEAR_MM": NEAR_MM, "SINE_INSIDE": 1 / n, **({"FLAT": 1} if flat else {})}
     kernels = {
-        name: device_scene.kernel(on, name, "render/exit_surface", "render/sample_queue", structs=STRUCTS, **options)
+        name: device_scene.kernel(scene, name, "render/exit_surface", "render/sample_queue", structs=STRUCTS, **options)
         for name in ("aim", "gather", "settle")
     }
-    return Staged(on, walk, kernels, facts, group=len(on.luts.weights))
+    return QueueWalk(scene, walk, kernels, facts, group=len(scene.luts.weights))

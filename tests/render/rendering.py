@@ -48,21 +48,21 @@ def ball(radius: float, count: int = 48, inward: bool = False) -> Mesh:
 
 def opened(
     shape: Mesh, look: Look, size: tuple[int, int] = (32, 32), given: Maps | None = None, around=None, luts=None, **more
-) -> device_scene.Stage:
+) -> device_scene.DeviceScene:
     """A stage of the default set."""
     found = lutgen.load() if luts is None else luts
-    return device_scene.open_stage(ocl.choose(), found, shape, given or Maps(), look, size, around, **more)
+    return device_scene.open_scene(ocl.choose(), found, shape, given or Maps(), look, size, around, **more)
 
 
-def sampled(on: device_scene.Stage, walk: flat_walk.Walk, samples: int) -> tuple[film.Picture, dict[str, int]]:
+def sampled(scene: device_scene.DeviceScene, walk: flat_walk.Walk, samples: int) -> tuple[film.Film, dict[str, int]]:
     """A picture of that many samples, and what was counted."""
-    start = film.empty(on.size, walk.group, {})
+    start = film.empty(scene.size, walk.group, {})
     goal = progressive.Goal(samples)
-    made, tally, _ = progressive.render(on, walk, start, goal, lambda one, noise: None)
+    made, tally, _ = progressive.render(scene, walk, start, goal, lambda one, noise: None)
     return made, tally.counts
 
 
-def mean(made: film.Picture) -> tuple[np.ndarray, np.ndarray]:
+def mean(made: film.Film) -> tuple[np.ndarray, np.ndarray]:
     """Mean color [3] of the skin in a picture and its standard error."""
     share = made.mask.sum()
     return made.rgb.sum(axis=(0, 1)) / share, np.sqrt((made.sigma() ** 2).sum(axis=(0, 1))) / share

@@ -162,7 +162,7 @@ def write_render(path, seed: int, gain=1.0, estimates=25) -> Picture:
     samples = true * (1 + 0.5 * drawn)
     products = np.stack([(samples[..., i] * samples[..., j]).sum(axis=0) for i, j in film._PAIRS], axis=-1)
     sums = np.concatenate([samples.sum(axis=0), np.full((ROWS, COLUMNS, 1), estimates), products], axis=-1)
-    film.write(film.Picture(sums, estimates, 4, {"walk": "none"}), path)
+    film.write(film.Film(sums, estimates, 4, {"walk": "none"}), path)
     covariance = np.stack([np.stack([((samples[..., i] - samples[..., i].mean(axis=0)) * samples[..., j]).sum(axis=0)
                                      for j in range(3)], axis=-1) for i in range(3)], axis=-2)  # fmt: skip
     return Picture(

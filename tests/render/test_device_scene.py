@@ -10,7 +10,7 @@ from rendering import BARE, EVEN, SKY, SUN, ball, mean, opened, plane, sampled
 import lutgen
 from lutgen import device as ocl
 from lutgen.files.texture_maps import Maps
-from lutgen.head import builtin, paint, soundness
+from lutgen.head import builtin, mend, paint
 from lutgen.render import device_scene, flat_walk, sample_queue
 from lutgen.scene import display
 from lutgen.scene import light as lighting
@@ -60,15 +60,15 @@ def test_the_same_pixels_see_the_same_skin(both, monkeypatch):
     Outlines apart (a pixel's middle is on one side for one and on the other for the other), depth to 0.02 mm; what maps
     say within what the viewer's mipmaps average, so in the median.
     """
-    shown, on, look = both
+    shown, scene, look = both
     real = ocl.source
     with monkeypatch.context() as patched:
         patched.setattr(ocl, "source", lambda *names: real(*names) + PUT + SEEN)
-        kernel = device_scene.kernel(on, "seen")
+        kernel = device_scene.kernel(scene, "seen")
     found = np.zeros((2 * SIZE[1], 2 * SIZE[0], 12), "f4")
-    out = ocl.buffer(on.device, found)
-    ocl.launch(on.device, kernel, (found.shape[0] * found.shape[1],), *on.arguments, out)
-    found = ocl.read(on.device, out, found)
+    out = ocl.buffer(scene.device, found)
+    ocl.launch(scene.device, kernel, (found.shape[0] * found.shape[1],), *scene.arguments, out)
+    found = ocl.read(scene.device, out, found)
     entering, facing, skin, _, detail = (gl.read(shown.targets["surface_buffer"], k)[::-1] for k in range(5))
     there, here = entering[..., 3] > 0, found[..., 9:].any(axis=-1)
     assert (there != here).mean() < 0.001
@@ -122,14 +122,14 @@ def still(device, epidermis_mm: float, dermis_mm: float):
 def test_stages_around_a_walk_that_stands_still(flat, light):
     """All wavelengths of a group together are the walk's own color, exactly: nothing else is random here."""
     look = SUN if light == "sun" else SKY
-    on = opened(plane(), look, around=EVEN)
-    walk = sample_queue.staged(on, still(on.device, 0.2, 1.0), {}, flat, flat_walk.REACH)
-    made, counts = sampled(on, walk, 16)
-    mu = expand.coefficients(on.luts.paths.wavelength_nm, on.luts.absorbers, *(
+    scene = opened(plane(), look, around=EVEN)
+    walk = sample_queue.queue_walk(scene, still(scene.device, 0.2, 1.0), {}, flat, flat_walk.REACH)
+    made, counts = sampled(scene, walk, 16)
+    mu = expand.coefficients(scene.luts.paths.wavelength_nm, scene.luts.absorbers, *(
         np.array([v]) for v in (look.melanin, look.eumelanin, look.hemoglobin)))  # fmt: skip
-    nu = on.luts.paths.nu_per_mm
-    share = on.luts.paths.entry * np.exp(-0.2 * (mu[0][:, 0] - nu) - (mu[1][:, 0] - nu))
-    expected = share @ on.luts.weights * (lighting.SUN if light == "sun" else 1)
+    nu = scene.luts.paths.nu_per_mm
+    share = scene.luts.paths.entry * np.exp(-0.2 * (mu[0][:, 0] - nu) - (mu[1][:, 0] - nu))
+    expected = share @ scene.luts.weights * (lighting.SUN if light == "sun" else 1)
     found, sigma = mean(made)
     assert np.all(np.abs(found - expected) < 4 * sigma + 2e-5)
     assert made.samples == 16
@@ -141,32 +141,32 @@ def test_stages_around_a_walk_that_stands_still(flat, light):
 def test_stages_follow_light_from_skin_to_skin():
     """Inside a closed ball every ray into the sky meets skin: as often as bounces are allowed, and no light comes."""
     look = replace(SKY, target_mm=(0, 0, 0), distance_mm=40, specular=0)
-    on = opened(ball(100.0, inward=True), look, (16, 16), around=EVEN)
-    walk = sample_queue.staged(on, still(on.device, 0.0, 0.0), {}, False, flat_walk.REACH)
-    made, counts = sampled(on, walk, 8)
+    scene = opened(ball(100.0, inward=True), look, (16, 16), around=EVEN)
+    walk = sample_queue.queue_walk(scene, still(scene.device, 0.0, 0.0), {}, False, flat_walk.REACH)
+    made, counts = sampled(scene, walk, 8)
     assert made.rgb.max() == 0
     assert counts["BOUNCES"] == 3 * counts["HITS"]
 
 
 def test_a_mesh_is_mended_and_its_oddities_said():
-    good, notes = soundness.mended(ball(100.0))
+    good, notes = mend.outward(ball(100.0))
     assert notes == ()
-    again = soundness.mended(replace(good, triangles=good.triangles[:, ::-1]))[0]
+    again = mend.outward(replace(good, triangles=good.triangles[:, ::-1]))[0]
     assert np.array_equal(np.sort(again.triangles, axis=1), np.sort(good.triangles, axis=1))
     outward = (again.normals * again.positions_mm).sum(axis=1)
     assert outward.min() > 0
-    flipped, notes = soundness.mended(ball(100.0, inward=True))
+    flipped, notes = mend.outward(ball(100.0, inward=True))
     assert "clockwise" in notes[0]
     assert (flipped.normals * flipped.positions_mm).sum(axis=1).min() > 0
     thin = np.concatenate([good.triangles, [[0, 0, 1], [5, 6, 5]]]).astype("i4")
-    fixed, notes = soundness.mended(replace(good, triangles=thin))
+    fixed, notes = mend.outward(replace(good, triangles=thin))
     assert np.array_equal(fixed.triangles, good.triangles)
     assert notes == (f"2 of {len(thin)} triangles have no area: left out",)
     with pytest.raises(lutgen.InputError, match="no triangle has an area"):
-        soundness.mended(replace(good, triangles=thin[-2:]))
-    assert soundness.mended(plane(300.0))[1] == ()
+        mend.outward(replace(good, triangles=thin[-2:]))
+    assert mend.outward(plane(300.0))[1] == ()
     for size in (2.0, 2000.0):
-        assert "check --mm-per-unit" in soundness.mended(ball(size))[1][0]
+        assert "check --mm-per-unit" in mend.outward(ball(size))[1][0]
 
 
 def test_no_pixel_is_nan_whatever_the_mesh_and_light():
@@ -179,25 +179,25 @@ def test_no_pixel_is_nan_whatever_the_mesh_and_light():
     )  # fmt: skip
     for light in ({"light_azimuth": 180.0}, {"light_size": 40.0, "light_elevation": 90.0}, {"light": 20.0}):
         look = replace(Look(target_mm=(0, 0, 0), distance_mm=400, bumps=3, roughness=0.15), **light)
-        on = opened(rough, look, around=EVEN)
-        made, counts = sampled(on, flat_walk.flat(on, photons=4096), 10)
+        scene = opened(rough, look, around=EVEN)
+        made, counts = sampled(scene, flat_walk.flat(scene, photons=4096), 10)
         assert np.all(np.isfinite(made.sums))
         assert counts["BROKEN"] == 0
         assert made.mask.max() == 1
     for radiance in (np.inf, 1e25):  # the second is finite, its square is not
         blazing = EVEN.copy()
         blazing[1, 3] = radiance
-        on = opened(shape, replace(SKY, target_mm=(0, 0, 0)), around=blazing)
-        made, counts = sampled(on, flat_walk.flat(on, photons=4096), 10)
+        scene = opened(shape, replace(SKY, target_mm=(0, 0, 0)), around=blazing)
+        made, counts = sampled(scene, flat_walk.flat(scene, photons=4096), 10)
         assert np.all(np.isfinite(made.sums))
         assert counts["BROKEN"] > 0
     broken = replace(shape, positions_mm=np.where(shape.positions_mm > 79.9, np.nan, shape.positions_mm).astype("f4"))
-    on = opened(broken, replace(SUN, target_mm=(0, 0, 0)))
-    assert np.all(np.isfinite(sampled(on, flat_walk.flat(on, photons=4096), 10)[0].sums))
+    scene = opened(broken, replace(SUN, target_mm=(0, 0, 0)))
+    assert np.all(np.isfinite(sampled(scene, flat_walk.flat(scene, photons=4096), 10)[0].sums))
 
 
 def test_the_camera_must_stand_outside():
     for shape, look in ((ball(100.0), replace(BARE, distance_mm=40)), (plane(), replace(BARE, azimuth=180))):
-        on = opened(shape, replace(look, target_mm=(0, 0, 0)))
+        scene = opened(shape, replace(look, target_mm=(0, 0, 0)))
         with pytest.raises(lutgen.InputError, match=r"the camera sees \d+ % back faces: it is inside the head"):
-            sampled(on, flat_walk.flat(on, photons=4096), 5)
+            sampled(scene, flat_walk.flat(scene, photons=4096), 5)

@@ -15,36 +15,36 @@ LIGHT_SUN = replace(LOOK, light=3.0)
 
 
 @pytest.fixture(scope="module")
-def on():
+def scene():
     return opened(ball(80.0), LIGHT_SUN)
 
 
 @pytest.fixture(scope="module")
-def walk(on):
-    return flat_walk.flat(on, photons=PHOTONS)
+def walk(scene):
+    return flat_walk.flat(scene, photons=PHOTONS)
 
 
-def test_sums_do_not_depend_on_how_launches_are_cut(on, walk, monkeypatch):
-    whole, counts = sampled(on, walk, 105)
+def test_sums_do_not_depend_on_how_launches_are_cut(scene, walk, monkeypatch):
+    whole, counts = sampled(scene, walk, 105)
     monkeypatch.setattr(progressive, "LAUNCH_SECONDS", 0.002)
-    cut, again = sampled(on, walk, 105)
+    cut, again = sampled(scene, walk, 105)
     assert np.array_equal(whole.sums, cut.sums)
     assert counts == again
     assert whole.samples == 105
 
 
-def test_a_run_that_goes_on_is_one_run(on, walk, tmp_path):
+def test_a_run_that_goes_on_is_one_run(scene, walk, tmp_path):
     """From the file, in single precision: means to 1e-6 of the picture's."""
-    straight, _ = sampled(on, walk, 60)
-    first, _ = sampled(on, walk, 25)
+    straight, _ = sampled(scene, walk, 60)
+    first, _ = sampled(scene, walk, 25)
     film.write(first, tmp_path / "a.exr")
     found = film.read(tmp_path / "a.exr")
     assert found.samples == 25
-    made, _, _ = progressive.render(on, walk, found, progressive.Goal(60), lambda one, noise: None)
+    made, _, _ = progressive.render(scene, walk, found, progressive.Goal(60), lambda one, noise: None)
     assert made.samples == 60
     assert np.abs(made.rgb - straight.rgb).max() < 1e-6 * straight.rgb.max()
     assert np.abs(made.sigma() - straight.sigma()).max() < 1e-4 * straight.sigma().max()
-    done, _, _ = progressive.render(on, walk, made, progressive.Goal(60), lambda one, noise: None)
+    done, _, _ = progressive.render(scene, walk, made, progressive.Goal(60), lambda one, noise: None)
     assert np.array_equal(done.sums, made.sums)
 
 
@@ -53,7 +53,7 @@ def test_the_stated_error_is_the_error_between_seeds(walk):
     made = []
     for seed in (1, 2):
         stage = opened(ball(80.0), LIGHT_SUN, (64, 64), seed=seed)
-        made.append(sampled(stage, replace(walk, stage=stage), 100)[0])
+        made.append(sampled(stage, replace(walk, scene=stage), 100)[0])
     one, two = made
     inside = (one.mask == 1) & (two.mask == 1) & (one.sigma().min(axis=-1) > 0)
     apart = (one.rgb - two.rgb)[inside] / np.hypot(one.sigma(), two.sigma())[inside]
@@ -65,39 +65,39 @@ def test_the_stated_error_is_the_error_between_seeds(walk):
     assert color.delta_e00(*labs).mean() / np.sqrt(2) == pytest.approx(film.noise_delta_e(one), rel=0.12)
 
 
-def test_noise_falls_with_samples_and_is_unknown_of_one(on, walk):
-    one, _ = sampled(on, walk, 5)
+def test_noise_falls_with_samples_and_is_unknown_of_one(scene, walk):
+    one, _ = sampled(scene, walk, 5)
     assert film.noise_delta_e(one) == np.inf
     assert np.all(np.isfinite(one.sigma()))
     assert np.allclose(one.sigma(), one.rgb, atol=1e-6)
-    few, many = (film.noise_delta_e(sampled(on, walk, n)[0]) for n in (50, 200))
+    few, many = (film.noise_delta_e(sampled(scene, walk, n)[0]) for n in (50, 200))
     assert 1.6 < few / many < 2.5
     made, _, noise = progressive.render(
-        on, walk, film.empty(on.size, walk.group, {}), progressive.Goal(noise=2.5), lambda made, noise: None
+        scene, walk, film.empty(scene.size, walk.group, {}), progressive.Goal(noise=2.5), lambda made, noise: None
     )
     assert noise <= 2.5
     assert made.samples < 10_000
 
 
-def test_a_noise_that_is_met_already_asks_for_nothing(on, walk):
+def test_a_noise_that_is_met_already_asks_for_nothing(scene, walk):
     made, _, noise = progressive.render(
-        on, walk, film.empty(on.size, walk.group, {}), progressive.Goal(noise=2.5), lambda made, noise: None
+        scene, walk, film.empty(scene.size, walk.group, {}), progressive.Goal(noise=2.5), lambda made, noise: None
     )
-    again, tally, same = progressive.render(on, walk, made, progressive.Goal(noise=2.5), lambda made, noise: None)
+    again, tally, same = progressive.render(scene, walk, made, progressive.Goal(noise=2.5), lambda made, noise: None)
     assert (again.samples, tally.rays, same) == (made.samples, 0, noise)
 
 
-def test_noise_of_a_head_smaller_than_its_pixels_is_known(on, walk):
-    made, _ = sampled(on, walk, 50)
+def test_noise_of_a_head_smaller_than_its_pixels_is_known(scene, walk):
+    made, _ = sampled(scene, walk, 50)
     part = replace(made, sums=made.sums * np.array([0.3] * 4 + [0.09] * 6))
     assert film.noise_delta_e(part) > 0.1
 
 
-def test_it_stops_by_time_and_when_told_and_saves_what_it_has(on, walk):
+def test_it_stops_by_time_and_when_told_and_saves_what_it_has(scene, walk):
     saved = []
-    start = film.empty(on.size, walk.group, {})
+    start = film.empty(scene.size, walk.group, {})
     made, tally, _ = progressive.render(
-        on, walk, start, progressive.Goal(seconds=0.1), lambda made, noise: saved.append(made.samples)
+        scene, walk, start, progressive.Goal(seconds=0.1), lambda made, noise: saved.append(made.samples)
     )
     assert saved == [made.samples]
     assert made.samples >= 5
@@ -108,23 +108,23 @@ def test_it_stops_by_time_and_when_told_and_saves_what_it_has(on, walk):
         asked.append(1)
         return len(asked) > 2
 
-    made, _, _ = progressive.render(on, walk, start, progressive.Goal(10**6), lambda *a: None, stopped)
+    made, _, _ = progressive.render(scene, walk, start, progressive.Goal(10**6), lambda *a: None, stopped)
     assert 10 <= made.samples < 10**6
 
 
-def test_files_are_saved_meanwhile(on, walk, monkeypatch):
+def test_files_are_saved_meanwhile(scene, walk, monkeypatch):
     monkeypatch.setattr(progressive, "SAVE_SECONDS", 0.0)
     monkeypatch.setattr(progressive, "LAUNCH_SECONDS", 0.002)
     saved = []
-    start = film.empty(on.size, walk.group, {})
-    progressive.render(on, walk, start, progressive.Goal(200), lambda made, noise: saved.append(made.samples))
+    start = film.empty(scene.size, walk.group, {})
+    progressive.render(scene, walk, start, progressive.Goal(200), lambda made, noise: saved.append(made.samples))
     assert len(saved) > 2
     assert saved == sorted(saved)
     assert saved[-1] == 200
 
 
-def test_a_file_is_whole_or_as_it_was(on, walk, tmp_path, monkeypatch):
-    made, _ = sampled(on, walk, 10)
+def test_a_file_is_whole_or_as_it_was(scene, walk, tmp_path, monkeypatch):
+    made, _ = sampled(scene, walk, 10)
     out = tmp_path / "a.exr"
     film.write(made, out)
     before = out.read_bytes()

@@ -48,13 +48,13 @@ def test_a_plane_under_even_light_has_the_color_of_the_lut(preset, light):
     """
     base = SUN if light == "sun" else SKY
     look = at_a_node(base) if preset == "node" else of_preset(preset, base)
-    on = opened(plane(), look, around=EVEN)
-    walk = flat_walk.flat(on, photons=PHOTONS)
-    found, sigma = mean(sampled(on, walk, 60)[0])
+    scene = opened(plane(), look, around=EVEN)
+    walk = flat_walk.flat(scene, photons=PHOTONS)
+    found, sigma = mean(sampled(scene, walk, 60)[0])
     found = found / (lighting.SUN if light == "sun" else 1)
-    expected, of_paths = from_paths(on.luts, skin_of(look))
+    expected, of_paths = from_paths(scene.luts, skin_of(look))
     if preset == "node":
-        expected = on.luts.color(*skin_of(look), space="acescg")
+        expected = scene.luts.color(*skin_of(look), space="acescg")
     of_exits = np.array(walk.facts["color_std_error_acescg"])
     assert np.all(np.abs(found - expected) < SIGMAS * np.sqrt(sigma**2 + of_paths**2 + of_exits**2))
     assert np.all(sigma < 0.02 * expected)  # else the law says little
@@ -84,24 +84,24 @@ __kernel void rings(SCENE, EXITS, uint samples, float3 skin, __global const floa
 """
 
 
-def ring_energy(on, found: flat_exits.Exits, monkeypatch, samples: int = 4096, items: int = 64):
+def ring_energy(scene, found: flat_exits.Exits, monkeypatch, samples: int = 4096, items: int = 64):
     """Energy of exits that the kernel draws, per ring of the set's profiles [rings, 3], and its standard error."""
     real = ocl.source
     with monkeypatch.context() as patched:
         patched.setattr(ocl, "source", lambda *names: real(*names) + RINGS)
-        edges = on.luts.paths.radius_edges_mm.astype("f4")
+        edges = scene.luts.paths.radius_edges_mm.astype("f4")
         kernel = device_scene.kernel(
-            on, "rings", "render/exit_surface", "render/exits",
+            scene, "rings", "render/exit_surface", "render/exits",
             ANGLES=len(found.cosines), CELLS=found.drawn.shape[1], DRAWS=flat_walk.DRAWS,
             SECTORS=flat_exits.SECTORS, QUANTILES=flat_exits.QUANTILES, LEAST_COSINE=float(found.cosines[0]), REACH=1.5,
             LUT_RINGS=len(edges) - 1,
         )  # fmt: skip
     sums = np.zeros((items, len(edges) - 1, 2, 3), "f4")
-    out = ocl.buffer(on.device, sums)
-    skin = np.array([*on.view["chromophores"], 0], "f4")
-    ocl.launch(on.device, kernel, (items,), *on.arguments, *flat_exits.buffers(on.device, found), np.uint32(samples),
-               skin, ocl.buffer(on.device, edges), out)  # fmt: skip
-    per_item = ocl.read(on.device, out, sums).astype(float)[:, :, 0] / samples
+    out = ocl.buffer(scene.device, sums)
+    skin = np.array([*scene.view["chromophores"], 0], "f4")
+    ocl.launch(scene.device, kernel, (items,), *scene.arguments, *flat_exits.buffers(scene.device, found),
+               np.uint32(samples), skin, ocl.buffer(scene.device, edges), out)  # fmt: skip
+    per_item = ocl.read(scene.device, out, sums).astype(float)[:, :, 0] / samples
     return per_item.mean(axis=0), per_item.std(axis=0, ddof=1) / np.sqrt(items)
 
 
@@ -110,14 +110,14 @@ def test_exits_lie_where_the_profile_has_them(preset, monkeypatch):
     """Energy per ring of exits drawn along the normal, which by reciprocity is what leaves under a small disc of light:
     4 sigma of draws, exits and the set's paths; encircled energy too, at every radius."""
     look = of_preset(preset, SUN)
-    on = opened(plane(), look)
-    edges, skin = on.luts.paths.radius_edges_mm, skin_of(look)
-    found = flat_exits.trace(on.device, on.luts, skin, PHOTONS, 3, edges=edges)
-    drawn, sigma = ring_energy(on, found, monkeypatch)
-    mu = expand.coefficients(on.luts.paths.wavelength_nm, on.luts.absorbers, *(np.array([v]) for v in skin))
-    expected = on.luts.paths.evaluate(*mu)[:, :, 0].T @ on.luts.weights
-    of_paths = np.sqrt((on.luts.paths.std_error(*mu)[:, :, 0] ** 2).T @ on.luts.weights**2)
-    of_exits = found.rings(on.luts, skin)[1]
+    scene = opened(plane(), look)
+    edges, skin = scene.luts.paths.radius_edges_mm, skin_of(look)
+    found = flat_exits.trace(scene.device, scene.luts, skin, PHOTONS, 3, edges=edges)
+    drawn, sigma = ring_energy(scene, found, monkeypatch)
+    mu = expand.coefficients(scene.luts.paths.wavelength_nm, scene.luts.absorbers, *(np.array([v]) for v in skin))
+    expected = scene.luts.paths.evaluate(*mu)[:, :, 0].T @ scene.luts.weights
+    of_paths = np.sqrt((scene.luts.paths.std_error(*mu)[:, :, 0] ** 2).T @ scene.luts.weights**2)
+    of_exits = found.rings(scene.luts, skin)[1]
     whole = np.sqrt(sigma**2 + of_paths**2 + of_exits**2)
     assert np.all(np.abs(drawn - expected) < SIGMAS * whole + 1e-7)
     within = np.abs(np.cumsum(drawn - expected, axis=0))
@@ -128,10 +128,10 @@ def test_exits_lie_where_the_profile_has_them(preset, monkeypatch):
 def test_rings_of_the_renderer_are_fine_enough(monkeypatch):
     """Its own rings, read at the profile's radii: encircled energy within 1 % of all light."""
     look = of_preset("light", SUN)
-    on = opened(plane(), look)
-    found = flat_exits.trace(on.device, on.luts, skin_of(look), PHOTONS, 3)
-    drawn, _ = ring_energy(on, found, monkeypatch)
-    profile = on.luts.profile(*skin_of(look)).energy
+    scene = opened(plane(), look)
+    found = flat_exits.trace(scene.device, scene.luts, skin_of(look), PHOTONS, 3)
+    drawn, _ = ring_energy(scene, found, monkeypatch)
+    profile = scene.luts.profile(*skin_of(look)).energy
     apart = np.cumsum(drawn / drawn.sum(axis=0), axis=0) - np.cumsum(profile / profile.sum(axis=0), axis=0)
     assert np.abs(apart).max() < 0.01
 
@@ -161,8 +161,8 @@ def test_rims_lose_nothing():
     colors = []
     for radius in (1.0, 100.0):
         look = replace(SKY, target_mm=(0, 0, 0), distance_mm=40 * radius, field_of_view=5.0)
-        on = opened(ball(radius), look, around=EVEN, bounces=0)
-        made, counts = sampled(on, flat_walk.flat(on, photons=PHOTONS), 100)
+        scene = opened(ball(radius), look, around=EVEN, bounces=0)
+        made, counts = sampled(scene, flat_walk.flat(scene, photons=PHOTONS), 100)
         colors.append(mean(made))
         if radius == 1:
             assert counts["MISSES"] > 0.03 * counts["PROBES"]
@@ -182,8 +182,8 @@ def test_skin_lights_skin_and_never_more_than_the_sky():
     look = replace(SKY, distance_mm=600, melanin=0.001, hemoglobin=0.001, field_of_view=12.0)
     found = []
     for bounces in (0, 1, 6):
-        on = opened(bowl(), look, around=EVEN, bounces=bounces)
-        made, counts = sampled(on, flat_walk.flat(on, photons=PHOTONS), 20)
+        scene = opened(bowl(), look, around=EVEN, bounces=bounces)
+        made, counts = sampled(scene, flat_walk.flat(scene, photons=PHOTONS), 20)
         found.append(mean(made)[0])
         assert (counts["BOUNCES"] > 0) == (bounces > 0)
     assert np.all(found[0] < 0.9 * found[1])
@@ -198,8 +198,8 @@ def test_sunlit_skin_lights_skin_without_surroundings(walk, specular):
     look = replace(SUN, light_azimuth=50.0, distance_mm=600, field_of_view=12.0, melanin=0.001, specular=specular)
     found = []
     for environment, bounces in ((0.0, 3), (1e-5, 3), (0.0, 0)):
-        on = opened(bowl(), replace(look, environment=environment), around=EVEN, bounces=bounces)
-        found.append(mean(sampled(on, flat_walk.WALKS[walk](on, 0), 160)[0]))
+        scene = opened(bowl(), replace(look, environment=environment), around=EVEN, bounces=bounces)
+        found.append(mean(sampled(scene, flat_walk.WALKS[walk](scene, 0), 160)[0]))
     (dark, one), (faint, two), (alone, three) = found
     assert np.all(np.abs(dark - faint) < SIGMAS * np.hypot(one, two))
     assert np.all(dark > alone + SIGMAS * np.hypot(one, three))
@@ -231,8 +231,8 @@ def test_skin_mirrors_skin_that_mirrors_the_sky(walk, samples):
                    field_of_view=5.0, melanin=0.5, hemoglobin=0.1)  # fmt: skip
     found = []
     for specular in (0.0, 1.0):
-        on = opened(corner(), replace(look, specular=specular), (16, 16), around=EVEN)
-        found.append(mean(sampled(on, flat_walk.WALKS[walk](on, 0), samples)[0]))
+        scene = opened(corner(), replace(look, specular=specular), (16, 16), around=EVEN)
+        found.append(mean(sampled(scene, flat_walk.WALKS[walk](scene, 0), samples)[0]))
     (plain, one), (shiny, two) = found
     seen, expected = shiny - plain, f * (f + plain) + plain * of_wall
     assert np.all(np.abs(seen - expected) < SIGMAS * np.hypot(one, two) + 0.02 * expected)
@@ -258,20 +258,20 @@ def test_an_even_sky_is_reflected_as_the_viewer_has_it(azimuth, roughness):
     look = replace(FRONT, entry=0, environment=1, light=0, azimuth=azimuth, roughness=roughness, field_of_view=5.0)
     means = []
     for specular in (1.0, 0.0):
-        on = opened(plane(4000.0), replace(look, specular=specular), around=EVEN, bounces=0)
-        means.append(mean(sampled(on, flat_walk.flat(on, photons=PHOTONS), 200)[0]))
+        scene = opened(plane(4000.0), replace(look, specular=specular), around=EVEN, bounces=0)
+        means.append(mean(sampled(scene, flat_walk.flat(scene, photons=PHOTONS), 200)[0]))
     (one, a), (two, b) = means
     assert np.all(np.abs(one - two - expected) < SIGMAS * np.hypot(a, b) + 0.0015)
 
 
 def test_no_light_is_black_and_other_oxygenation_is_blue():
-    on = opened(plane(), replace(BARE, light=0, environment=0))
-    made, counts = sampled(on, flat_walk.flat(on, photons=PHOTONS), 5)
+    scene = opened(plane(), replace(BARE, light=0, environment=0))
+    made, counts = sampled(scene, flat_walk.flat(scene, photons=PHOTONS), 5)
     assert made.rgb.max() == 0
     assert counts["SUN_RAYS"] == counts["SKY_RAYS"] == 0
     hues = []
     for oxygenation in (1.0, 0.0):
         look = replace(SUN, melanin=0.008, hemoglobin=0.03, oxygenation=oxygenation)
-        on = opened(plane(), look)
-        hues.append(mean(sampled(on, flat_walk.flat(on, photons=PHOTONS), 20)[0])[0])
+        scene = opened(plane(), look)
+        hues.append(mean(sampled(scene, flat_walk.flat(scene, photons=PHOTONS), 20)[0])[0])
     assert hues[0][0] / hues[0][2] > 1.05 * hues[1][0] / hues[1][2]

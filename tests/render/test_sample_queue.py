@@ -32,9 +32,9 @@ def block(side: float = 120.0, depth: float = 60.0) -> Mesh:
 def test_skin_under_even_light_has_the_color_of_the_lut(walk, light):
     """Along the normal, without entry factors, in the middle of a plane or of a thick block's face."""
     look = replace(of_preset("light", SUN if light == "sun" else SKY), field_of_view=6.0)
-    on = opened(plane() if walk == "flat-full" else block(), look, around=EVEN)
-    found, sigma = mean(sampled(on, flat_walk.WALKS[walk](on, 0), 160)[0])
-    expected, of_paths = from_paths(on.luts, skin_of(look))
+    scene = opened(plane() if walk == "flat-full" else block(), look, around=EVEN)
+    found, sigma = mean(sampled(scene, flat_walk.WALKS[walk](scene, 0), 160)[0])
+    expected, of_paths = from_paths(scene.luts, skin_of(look))
     found, sigma = (v / (lighting.SUN if light == "sun" else 1) for v in (found, sigma))
     assert np.all(np.abs(found - expected) < SIGMAS * np.hypot(sigma, of_paths))
     assert np.all(sigma < 0.02 * expected)
@@ -50,17 +50,17 @@ def test_both_flat_walks_make_the_same_picture(ratio):
         around = np.arctan2(shape.positions_mm[:, 0], shape.positions_mm[:, 2]) / (2 * np.pi) + 0.5
         shape = replace(shape, uv=np.stack([around, np.full_like(around, 0.5)], axis=1).astype("f4"))
     look = replace(BARE, entry=1, specular=0, environment=1, light=2.0, light_azimuth=50.0, field_of_view=30.0)
-    on = opened(shape, look, (24, 24), Maps(chromophores=texels), EVEN)
-    full, one = mean(sampled(on, flat_walk.WALKS["flat-full"](on, 0), 240)[0])
-    drawn, two = mean(sampled(on, flat_walk.flat(on, photons=4 * PHOTONS), 100)[0])
+    scene = opened(shape, look, (24, 24), Maps(chromophores=texels), EVEN)
+    full, one = mean(sampled(scene, flat_walk.WALKS["flat-full"](scene, 0), 240)[0])
+    drawn, two = mean(sampled(scene, flat_walk.flat(scene, photons=4 * PHOTONS), 100)[0])
     assert np.all(np.abs(full - drawn) < SIGMAS * np.hypot(one, two) + 0.004 * drawn)  # rings and angles of the table
-    least = mesh_walk.least_absorption(on)
+    least = mesh_walk.least_absorption(scene)
     if ratio is None:
         plain = least
-        assert np.all(plain > 1.02 * on.luts.paths.nu_per_mm)
+        assert np.all(plain > 1.02 * scene.luts.paths.nu_per_mm)
     else:
         assert np.all(least < mesh_walk.least_absorption(opened(shape, look)))
-        assert np.all(least >= 0.999 * on.luts.paths.nu_per_mm)
+        assert np.all(least >= 0.999 * scene.luts.paths.nu_per_mm)
 
 
 def test_thin_skin_lets_light_through_by_the_walk_inside_only():
@@ -68,8 +68,8 @@ def test_thin_skin_lets_light_through_by_the_walk_inside_only():
     look = replace(SUN, light_azimuth=180.0, field_of_view=6.0)
     seen = {}
     for walk in ("flat-full", "mesh"):
-        on = opened(block(60.0, 2.0), look)
-        seen[walk], sigma = mean(sampled(on, flat_walk.WALKS[walk](on, 0), 80)[0])
+        scene = opened(block(60.0, 2.0), look)
+        seen[walk], sigma = mean(sampled(scene, flat_walk.WALKS[walk](scene, 0), 80)[0])
         seen[walk, "sigma"] = sigma
     assert np.all(seen["flat-full"] == 0)
     red, green, blue = seen["mesh"]
@@ -109,14 +109,14 @@ def test_the_command_says_what_a_walk_inside_needs(tmp_path, capsys):
 
 def test_the_same_seed_makes_the_same_picture():
     """Whether in one run or in two."""
-    on = opened(ball(60.0), replace(SUN, field_of_view=20.0), (16, 16), around=EVEN)
-    K = len(on.luts.weights)
-    once, _ = sampled(on, flat_walk.WALKS["mesh"](on, 3), 4 * K)
-    walk = flat_walk.WALKS["mesh"](on, 3)
-    made = film.empty(on.size, walk.group, {})
+    scene = opened(ball(60.0), replace(SUN, field_of_view=20.0), (16, 16), around=EVEN)
+    K = len(scene.luts.weights)
+    once, _ = sampled(scene, flat_walk.WALKS["mesh"](scene, 3), 4 * K)
+    walk = flat_walk.WALKS["mesh"](scene, 3)
+    made = film.empty(scene.size, walk.group, {})
     for goal in (2 * K, 4 * K):
-        made, _, _ = progressive.render(on, walk, made, progressive.Goal(goal), lambda one, noise: None)
+        made, _, _ = progressive.render(scene, walk, made, progressive.Goal(goal), lambda one, noise: None)
     assert made.samples == once.samples
     assert np.allclose(made.sums, once.sums, rtol=1e-6, atol=1e-7)
-    other, _ = sampled(on, flat_walk.WALKS["mesh"](on, 4), 4 * K)
+    other, _ = sampled(scene, flat_walk.WALKS["mesh"](scene, 4), 4 * K)
     assert not np.allclose(other.sums, once.sums, rtol=1e-3)

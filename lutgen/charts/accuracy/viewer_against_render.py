@@ -83,7 +83,7 @@ def differences(costs: dict, extent: dict, progress: Callable = drawing.silent) 
 
 def rendered(shape, textures, look: Look, side: int, samples: int, seed: int = 0) -> compare_files.Picture:
     """The scene traced by the flat walk, side x side pixels."""
-    opened = device_scene.open_stage(ocl.choose(), lutgen.load(), shape, textures, look, (side, side), seed=seed)
+    opened = device_scene.open_scene(ocl.choose(), lutgen.load(), shape, textures, look, (side, side), seed=seed)
     walk = flat_walk.flat(opened, seed)
     start, goal = film.empty((side, side), walk.group, {}), progressive.Goal(samples=samples)
     traced, _, _ = progressive.render(opened, walk, start, goal, lambda picture, noise: None)

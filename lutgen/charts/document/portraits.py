@@ -61,7 +61,7 @@ def _all(device: ocl.Device, size: tuple[int, int], progress: Callable) -> Itera
                              (MEASURED[skin], TEXTURED)):  # fmt: skip
             progress(f"portrait: {preset}, {kind}", None)
             look = looks.of_preset(preset, Look() if kind == TEXTURED else Look(bumps=0.0))
-            opened = device_scene.open_stage(device, luts, *models[kind], look, size)
+            opened = device_scene.open_scene(device, luts, *models[kind], look, size)
             levels = SAMPLES if preset != MEASURED[skin] else SAMPLES[-1:]
             for traced, noise in at_samples(opened, levels):
                 pixels = display.picture(traced.rgb, traced.mask, look.exposure)
@@ -69,8 +69,8 @@ def _all(device: ocl.Device, size: tuple[int, int], progress: Callable) -> Itera
 
 
 def at_samples(
-    opened: device_scene.Stage, levels: tuple[int, ...], seed: int = 0
-) -> Iterator[tuple[film.Picture, float]]:
+    opened: device_scene.DeviceScene, levels: tuple[int, ...], seed: int = 0
+) -> Iterator[tuple[film.Film, float]]:
     """One picture by the flat walk as it is at each number of samples, and its noise in ΔE00."""
     walk = flat_walk.flat(opened, seed)
     traced = film.empty(opened.size, walk.group, {})
