@@ -11,12 +11,12 @@ import numpy as np
 from lutgen.planning import costs, prediction
 from lutgen.planning.needs import Needs
 from lutgen.planning.prediction import Colors, Profiles
+from lutgen.skin import chromophores
 from lutgen.solvers import exact_totals
 from lutgen.tables import wavelengths
 from lutgen.tables.axes import Axis, Grid
 from lutgen.tables.recipe import Recipe
 
-AXES = ("melanin", "eumelanin", "hemoglobin")
 LEEWAY = 1.1
 """A rung down counts as holding up to this times the tolerance: eight bakes differ so much from another eight."""
 PHOTONS = 256, 2**28
@@ -92,7 +92,7 @@ def ladder(recipe: Recipe, with_profile: bool = True) -> Iterator[tuple[str, Rec
         yield "photons", replace(recipe, photons=recipe.photons // 4)
     for table in ("color", "profile") if with_profile else ("color",):
         grid = getattr(recipe, table)
-        for axis in AXES:
+        for axis in chromophores.NAMES:
             count = getattr(grid, axis).count
             if count > 2:
                 yield f"{table} {axis}", replace(recipe, **{table: resized(grid, axis, count * 3 // 4)})
@@ -106,7 +106,7 @@ def resized(grid: Grid, axis: str, count: int) -> Grid:
 def coarsest(needs: Needs, error: Callable[[Needs, Grid], float]) -> Grid:
     """Two nodes along each axis that varies, with the spacing that errs least along it alone with four nodes."""
     center, chosen = middles(needs), {}
-    for axis in AXES:
+    for axis in chromophores.NAMES:
         span = getattr(needs, axis)
         if span[0] == span[1]:
             chosen[axis] = axis_of(axis, span, 1, "linear")
@@ -125,7 +125,7 @@ def middles(needs: Needs) -> dict[str, float]:
     """The middle of each axis, in the spacing that random skins are drawn with."""
     return {
         axis: float(np.mean(span) if axis == "eumelanin" else np.sqrt(span[0] * span[1]))
-        for axis, span in ((axis, getattr(needs, axis)) for axis in AXES)
+        for axis, span in ((axis, getattr(needs, axis)) for axis in chromophores.NAMES)
     }
 
 

@@ -43,14 +43,14 @@ SIZES = (
 """Nodes of color and profile tables, and rings."""
 CHILD = """
 import json, time
-from lutgen import baking, config, manifest
-at = {}
+from lutgen.tables import bake, recipe, storage
+began = {}
 def progress(stage, tally):
     if tally is None:
-        at[stage] = time.process_time()
-luts = baking.bake(config.load("recipe.toml"), progress=progress)
-manifest.save(luts, "set", True)
-trace = at["exact totals"] - at["trace"]
+        began[stage] = time.process_time()
+luts = bake.bake(recipe.load("recipe.toml"), progress=progress)
+storage.save(luts, "set", True)
+trace = began["exact totals"] - began["trace"]
 print(json.dumps({"trace": trace, "rest": time.process_time() - trace}))
 """
 

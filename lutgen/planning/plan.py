@@ -167,7 +167,7 @@ def _apart(value: float, limit: float, digits: int) -> str:
 
 def nodes(grid: Grid) -> str:
     """A grid's node counts: melanin, eumelanin, hemoglobin."""
-    return " × ".join(str(getattr(grid, axis).count) for axis in judge.AXES)
+    return " × ".join(str(axis.count) for axis in grid.axes[::-1])
 
 
 def unaffordable(judged: Judge, found: list[tuple[float, int]]) -> InputError:

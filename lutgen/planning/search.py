@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from lutgen.planning import prediction
-from lutgen.planning.judge import AXES, LEEWAY, PHOTONS, SPACINGS, Judge, axis_of, middles, resized
+from lutgen.planning.judge import LEEWAY, PHOTONS, SPACINGS, Judge, axis_of, middles, resized
 from lutgen.planning.needs import Needs
+from lutgen.skin import chromophores
 from lutgen.tables import wavelengths
 from lutgen.tables.axes import Grid
 from lutgen.tables.recipe import RINGS, Recipe
@@ -155,7 +156,7 @@ def least_photons(judged: Judge, recipe: Recipe, most: int = PHOTONS[1]) -> Reci
 
 def _finer(grid: Grid, error: Callable[[Grid], float]) -> Grid | None:
     """The grid with one node more, where that lowers the error most, in that axis's best spacing; None at the end."""
-    counts = {axis: getattr(grid, axis).count for axis in AXES}
+    counts = {axis: getattr(grid, axis).count for axis in chromophores.NAMES}
     finer = {axis: resized(grid, axis, n + 1) for axis, n in counts.items() if 1 < n < MOST_NODES}
     if not finer:
         return None
@@ -165,7 +166,7 @@ def _finer(grid: Grid, error: Callable[[Grid], float]) -> Grid | None:
 
 def _spaced(grid: Grid, error: Callable[[Grid], float]) -> Grid:
     """The grid in the spacings that err least, axis by axis."""
-    for axis in AXES:
+    for axis in chromophores.NAMES:
         grid = min(_respaced(grid, axis), key=error)
     return grid
 
@@ -181,7 +182,7 @@ def _respaced(grid: Grid, axis: str) -> Iterator[Grid]:
 
 def _pruned(grid: Grid, holds: Callable[[Grid], bool]) -> Grid:
     """The grid without nodes that it can spare, one by one, whatever the spacing of their axis."""
-    for axis in AXES:
+    for axis in chromophores.NAMES:
         while (count := getattr(grid, axis).count) > 2:
             fewer = _respaced(resized(grid, axis, count - 1), axis)
             coarser = next((one for one in fewer if holds(one)), None)

@@ -105,7 +105,7 @@ def open_scene(
     `bounces` times.
     """
     grid = luts.color_lut.grid
-    for axis in (grid.melanin, grid.eumelanin, grid.hemoglobin):
+    for axis in grid.axes[::-1]:
         in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
     if look.oxygenation != luts.oxygenation:
         luts = luts.expand(oxygenation=look.oxygenation)
@@ -230,7 +230,7 @@ def _view(
     camera = looks.camera(look, *size)
     side, up, back = camera.view[:3, :3]
     grid = luts.color_lut.grid
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    axes = grid.axes[::-1]
     turn = np.radians(look.environment_azimuth)
     values = {
         "eye": camera.eye_mm, "forward": -back, "right": side / camera.projection[0, 0],

@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 from lutgen import color
+from lutgen.skin import chromophores
 from lutgen.skin.tissue import PRESETS, Skin
 from lutgen.solvers import profiles
 from lutgen.tables.axes import Axis, Grid
@@ -122,7 +123,7 @@ def _color_chart(canvas: Canvas, luts: LutSet) -> None:
 
 def _clamped(grid: Grid, skin: Skin) -> tuple[float, ...]:
     """Melanin, eumelanin and hemoglobin of the nearest skin within the grid's axes."""
-    axes = (grid.melanin, grid.eumelanin, grid.hemoglobin)
+    axes = grid.axes[::-1]
     return tuple(min(max(getattr(skin, axis.name), axis.low), axis.high) for axis in axes)
 
 
@@ -237,7 +238,7 @@ def draw_fit(skin: Skin, result: dict) -> Image.Image:
         canvas.text(left, 200, words, 12, GRAY)
     rmse = "" if result["rmse"] is None else f", RMSE {_percent(result['rmse'])}"
     canvas.text(24, 224, f"CIEDE2000 {result['delta_e00']:.2f}{rmse}", 12)
-    for i, name in enumerate(("melanin", "eumelanin", "hemoglobin", "oxygenation")):
+    for i, name in enumerate((*chromophores.NAMES, "oxygenation")):
         scale, unit = (1, "") if name == "eumelanin" else (100, " %")
         sigma = result["sigma"].get(name)
         how = "at its bound" if name in result["sigma"] else "fixed"

@@ -74,7 +74,7 @@ def value(folder, name: str) -> np.ndarray:
 def shown(luts, melanin, eumelanin, hemoglobin) -> np.ndarray:
     """The LUT's color, its ends included: 16 bits fall a hair beyond them."""
     grid = luts.color_lut.grid
-    axes = (grid.melanin, grid.eumelanin, grid.hemoglobin)
+    axes = grid.axes[::-1]
     return luts.color(*(np.clip(v, a.low, a.high) for v, a in zip((melanin, eumelanin, hemoglobin), axes, strict=True)))
 
 

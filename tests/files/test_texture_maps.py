@@ -6,6 +6,7 @@ from PIL import Image
 
 import lutgen
 from lutgen.files import exr, texture_maps
+from lutgen.skin import chromophores
 
 
 def test_ratios_come_back_within_half_a_step():
@@ -116,3 +117,8 @@ def test_resizing_keeps_even_values_and_order():
     ramp = texture_maps.resized(np.array([[0.0, 1.0]]), 1, 8)[0]
     assert np.all(np.diff(ramp) >= 0)
     assert (ramp[0], ramp[-1]) == (0, 1)
+
+
+def test_ratio_maps_are_named_by_the_chromophores():
+    """Files lie below skin, which spells the names; nothing else would tell them apart."""
+    assert texture_maps.RATIOS == chromophores.NAMES

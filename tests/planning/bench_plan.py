@@ -16,6 +16,7 @@ import numpy as np
 from lutgen.planning import judge, prediction, verify
 from lutgen.planning.needs import VARIABLE, Needs, scene
 from lutgen.planning.plan import Plan, least
+from lutgen.skin import chromophores
 from lutgen.skin.chromophores import EUMELANIN, HEMOGLOBIN, MELANIN
 from lutgen.skin.tissue import PRESETS
 from lutgen.solvers.paths import PathTable
@@ -60,7 +61,7 @@ def random_scene(rng: np.random.Generator) -> tuple[str, str, Needs]:
     if kind == "presets":
         skins = [PRESETS[name] for name in names]
         tones = ",".join(names)
-        for name in ("melanin", "eumelanin", "hemoglobin"):
+        for name in chromophores.NAMES:
             values = sorted(getattr(skin, name) for skin in skins)
             if name not in vary and values[0] < values[1]:
                 vary.append(name)

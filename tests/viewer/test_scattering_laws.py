@@ -90,7 +90,7 @@ def fetched(plane, skins):
 
 def test_a_shader_fetches_what_numpy_interpolates(plane):
     rng, grid = np.random.default_rng(4), plane.luts.color_lut.grid
-    axes = grid.melanin, grid.eumelanin, grid.hemoglobin
+    axes = grid.axes[::-1]
     skins = np.stack([a.low + (a.high - a.low) * rng.random(10_000) ** 2 for a in axes], axis=1).astype("f4")
     expected = grid.interpolate(plane.luts.color_lut.acescg, *skins.astype(float).T)
     assert np.abs(fetched(plane, skins) - expected).max() <= 1e-3

@@ -87,7 +87,7 @@ def _within_cells(picked: np.ndarray, rng: np.random.Generator) -> tuple[np.ndar
     skins, corners = [], set()
     for skin in picked.T:
         inside, spans = [], []
-        for axis, value in zip((GRID.melanin, GRID.eumelanin, GRID.hemoglobin), skin, strict=True):
+        for axis, value in zip(GRID.axes[::-1], skin, strict=True):
             low = min(int(axis.position(value)), axis.count - 2)
             bounds = axis.values[low : low + 2]
             log = axis.name != "eumelanin"

@@ -20,6 +20,7 @@ from lutgen.charts import drawing
 from lutgen.charts.document.spectra import percent, shades, spectra
 from lutgen.charts.drawing import DASHES, GRAY, HUES, INK, inches, leader, note, write
 from lutgen.charts.stability.error_maps import MIXED_DEPTH_MM, mixed_layer
+from lutgen.skin import chromophores
 from lutgen.skin.tissue import PRESETS, Layer, Skin, layers
 from lutgen.solvers import burley, dipole, direct, multipole, path_table, profiles
 from lutgen.tables import bake, expand, wavelengths
@@ -85,7 +86,7 @@ def truth(photons: int, progress: Callable = drawing.silent) -> tuple[np.ndarray
     rule, since = wavelengths.load(TRUTH_RULE), time.perf_counter()
     skins = [PRESETS[tone] for tone in TONES]
     medium, reach = bake.skin_medium(skins[0].tissue, rule.wavelength_nm)
-    shares = (np.array([getattr(skin, name) for skin in skins]) for name in ("melanin", "eumelanin", "hemoglobin"))
+    shares = (np.array([getattr(skin, name) for skin in skins]) for name in chromophores.NAMES)
     mu = expand.coefficients(rule.wavelength_nm, expand.absorbers(rule.wavelength_nm, 0.7), *shares)
     halves = []
     for seed in TRUTH_SEEDS:

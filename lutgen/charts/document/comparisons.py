@@ -10,6 +10,7 @@ from lutgen import color
 from lutgen.charts import drawing
 from lutgen.charts.document.spectra import columns, nanometers, numbers, percent, shades, spectra, sweep, ticks
 from lutgen.charts.drawing import DASHES, GRAY, HUES, inches, write
+from lutgen.skin import chromophores
 from lutgen.skin.tissue import LAWS, PRESETS, Skin, Tissue, plain, reduced_scattering
 
 TYPES = ("Caucasian", "Asian", "African")
@@ -36,8 +37,7 @@ _COLUMNS = {
 
 def told(skin: Skin, between: str = "\n") -> str:
     """A skin's chromophores in words."""
-    fields = ("melanin", "eumelanin", "hemoglobin")
-    return between.join(f"{name} {percent(getattr(skin, name), name)}" for name in fields)
+    return between.join(f"{name} {percent(getattr(skin, name), name)}" for name in chromophores.NAMES)
 
 
 def dress_spectra(axes) -> None:

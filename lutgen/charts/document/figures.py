@@ -23,6 +23,7 @@ from lutgen.charts.document.spectra import (
     ticks,
 )
 from lutgen.charts.drawing import DASHES, GRAY, HUES, inches, write
+from lutgen.skin import chromophores
 from lutgen.skin.tissue import PRESETS, plain
 
 STEPS = 24
@@ -62,7 +63,7 @@ def sweep_figure(folder: Path, parameter: str, steps: int = STEPS) -> str:
     apart = {p: color.delta_e00(*(looks[p, a][1] for a in ABSORPTIONS)) for p in PIPELINE_NAMES}
     between = color.delta_e00(*(looks[p, "linear"][1] for p in PIPELINE_NAMES))
     base, ends, _ = SWEEPS[parameter]
-    fixed = [f"{n} {percent(getattr(base, n), n)}" for n in ("melanin", "eumelanin", "hemoglobin") if n != parameter]
+    fixed = [f"{n} {percent(getattr(base, n), n)}" for n in chromophores.NAMES if n != parameter]
     title = f"{parameter.capitalize()} {' to '.join(percent(v, parameter) for v in ends)}; {', '.join(fixed)}"
     notes = (
         "A sweep of the source document, from exact spectra. Linear absorption is right in the mean; the document's\n"
