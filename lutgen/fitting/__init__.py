@@ -92,15 +92,15 @@ def fit(
         noise = in_range("noise", noise, *NOISE["color" if data.reflectance is None else "spectrum"])
     names = _names(parameters, data, noise)
     task = nearest.problem(data, names, base, specular(base.refractive_index) if specular_included else 0.0)
-    at = nearest.solve(task)
-    values = {name: float(value[0]) for name, value in task.values(at[None]).items()}
-    reflectance = task.spectra(at[None])[0]
+    point = nearest.solve(task)
+    values = {name: float(value[0]) for name, value in task.values(point[None]).items()}
+    reflectance = task.spectra(point[None])[0]
     xyz = reflectance @ task.weights
     left = float(color.delta_e00(color.lab(xyz), task.lab))
     rmse = None if data.reflectance is None else float(np.sqrt(np.mean((reflectance - data.reflectance) ** 2)))
-    far = _far(task, at, xyz, left)
-    free = (at > task.low) & (at < task.high)
-    spread, correlation, alike = _spread(task, at, free, noise)
+    far = _far(task, point, xyz, left)
+    free = (point > task.low) & (point < task.high)
+    spread, correlation, alike = _spread(task, point, free, noise)
     per_step = np.array([3 * np.cbrt(values[name]) ** 2 if name in CUBE_ROOT else 1.0 for name in names])
     sigma = {n: float(s) if inside else None for n, s, inside in zip(names, spread * per_step, free, strict=True)}
     notes = (*data.notes, *far, *_cautions(values, sigma, correlation), *_of_spectrum(data, alike))
@@ -126,29 +126,29 @@ def _names(parameters: Iterable[str] | None, data: Measured, noise: float | None
     return tuple(name for name in PARAMETERS if name in wanted)
 
 
-def _spread(task: Problem, at: np.ndarray, free: np.ndarray, noise: float | None):
+def _spread(task: Problem, point: np.ndarray, free: np.ndarray, noise: float | None):
     """Sigma [P] of a point (0 at a bound), correlation [P, P], and how alike neighboring residuals are."""
     ends = task.low, task.high
     if task.data.reflectance is None:
-        solution = np.linalg.pinv(least_squares.linearized(task.residual, at, *ends)[1][:, free], rcond=1e-9)
+        solution = np.linalg.pinv(least_squares.linearized(task.residual, point, *ends)[1][:, free], rcond=1e-9)
         inner, alike = (1.0 if noise is None else noise) ** 2 * solution @ solution.T, 0.0
     else:
-        found, slope = least_squares.linearized(task.spectra, at, *ends)
+        reflectance, slope = least_squares.linearized(task.spectra, point, *ends)
         slope = slope[:, free]
-        own, of_color = task.slopes(found)
+        own, of_color = task.slopes(reflectance)
         inverse = np.linalg.pinv(np.concatenate([own[:, None] * slope, of_color @ slope]), rcond=1e-9)
-        solution = inverse[:, : len(found)] * own + inverse[:, len(found) :] @ of_color
-        inner, alike = least_squares.covariance(solution, slope, task.data.reflectance - found, noise)
-    spread, correlation = np.zeros(len(at)), np.zeros((len(at), len(at)))
+        solution = inverse[:, : len(reflectance)] * own + inverse[:, len(reflectance) :] @ of_color
+        inner, alike = least_squares.covariance(solution, slope, task.data.reflectance - reflectance, noise)
+    spread, correlation = np.zeros(len(point)), np.zeros((len(point), len(point)))
     spread[free] = np.sqrt(np.diag(inner))
     correlation[np.ix_(free, free)] = inner / np.maximum(np.outer(spread[free], spread[free]), 1e-300)
     np.fill_diagonal(correlation, free)
     return spread, correlation, alike
 
 
-def _far(task: Problem, at: np.ndarray, xyz: np.ndarray, left: float) -> list[str]:
+def _far(task: Problem, point: np.ndarray, xyz: np.ndarray, left: float) -> list[str]:
     """What to say of a measurement that the nearest skin misses by a visible difference; InputError if by far."""
-    shape = float(np.linalg.norm(task.residual(at[None])[0][:-3]))
+    shape = float(np.linalg.norm(task.residual(point[None])[0][:-3]))
     if left > NO_SKIN:
         here, there = (color.hex_code(color.from_xyz(v, "srgb")) for v in (task.data.xyz, xyz))
         raise InputError(

@@ -37,7 +37,7 @@ class Measured:
     notes: tuple[str, ...] = ()
 
 
-def read(given) -> Measured:
+def read(source) -> Measured:
     """Read a CSV's path, a color in words (GRAMMAR) or a pair (wavelengths in nm [n], reflectance [n]).
 
     Raises InputError that names what is wrong.
@@ -45,10 +45,10 @@ def read(given) -> Measured:
     >>> read("lab:65,12,17").xyz.round(3).tolist()
     [0.358, 0.34, 0.251]
     """
-    if isinstance(given, Measured):
-        return given
-    if isinstance(given, (str, Path)):
-        text = str(given)
+    if isinstance(source, Measured):
+        return source
+    if isinstance(source, (str, Path)):
+        text = str(source)
         if not text.strip():
             raise InputError(f"measured = {text!r}: a CSV's path or a color is needed: {GRAMMAR}")
         code, named = _HEX.fullmatch(text.strip()), _SPACE.fullmatch(text)
@@ -60,9 +60,9 @@ def read(given) -> Measured:
             raise InputError(f"color = {shown(text)}: six hexadecimal digits are needed; allowed is {GRAMMAR}")
         return _from_csv(Path(text))
     try:
-        nm, reflectance = given
+        nm, reflectance = source
     except (TypeError, ValueError):
-        raise InputError(f"measured = {shown(given)}: a CSV's path, a color or (wavelength_nm, reflectance)") from None
+        raise InputError(f"measured = {shown(source)}: a CSV's path, a color or (wavelength_nm, reflectance)") from None
     return spectrum(nm, reflectance)
 
 

@@ -57,31 +57,31 @@ class Problem:
 
     def values(self, points: np.ndarray) -> dict[str, np.ndarray]:
         """The fitted parameters [B] at points [B, P]."""
-        found = {name: column ** _power(name) for name, column in zip(self.names, points.T, strict=True)}
-        return {name: np.clip(value, *PARAMETERS[name]) for name, value in found.items()}
+        values = {name: column ** _power(name) for name, column in zip(self.names, points.T, strict=True)}
+        return {name: np.clip(value, *PARAMETERS[name]) for name, value in values.items()}
 
     def spectra(self, points: np.ndarray) -> np.ndarray:
         """The model's reflectance [B, n] at points [B, P]."""
         of = {name: np.full(len(points), getattr(self.base, name)) for name in PARAMETERS} | self.values(points)
-        found = exact_totals.spectra(
+        reflectance = exact_totals.spectra(
             self._exact, self.wavelength_nm, of["melanin"], of["eumelanin"], of["hemoglobin"], of["oxygenation"]
         )
-        return found + self.offset
+        return reflectance + self.offset
 
     def residual(self, points: np.ndarray) -> np.ndarray:
         """Differences [B, n + 3] in lightness per wavelength and in color; [B, 3] where there is only a color."""
-        found = self.spectra(points)
-        apart = (color.lab(found @ self.weights) - self.lab) @ self.metric.T
+        reflectance = self.spectra(points)
+        apart = (color.lab(reflectance @ self.weights) - self.lab) @ self.metric.T
         if self.data.reflectance is None:
             return apart
-        share = 116 / np.sqrt(found.shape[1])
-        return np.concatenate([share * (np.cbrt(found) - np.cbrt(self.data.reflectance)), apart], axis=1)
+        share = 116 / np.sqrt(reflectance.shape[1])
+        return np.concatenate([share * (np.cbrt(reflectance) - np.cbrt(self.data.reflectance)), apart], axis=1)
 
-    def slopes(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def slopes(self, reflectance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What `residual` gains per reflectance at a spectrum [n]: each wavelength's own [n], the color's [3, n]."""
-        xyz = found @ self.weights
+        xyz = reflectance @ self.weights
         to_lab = least_squares.linearized(color.lab, xyz, np.zeros(3), 2 * xyz)[1]
-        return 116 / 3 / np.cbrt(found) ** 2 / np.sqrt(len(found)), self.metric @ to_lab @ self.weights.T
+        return 116 / 3 / np.cbrt(reflectance) ** 2 / np.sqrt(len(reflectance)), self.metric @ to_lab @ self.weights.T
 
 
 def problem(data: Measured, names: tuple[str, ...], base: Skin, offset: float = 0.0) -> Problem:

@@ -116,42 +116,42 @@ class Surface:
         """Last node of either axis."""
         return self.melanin.count - 1.0, self.hemoglobin.count - 1.0
 
-    def read(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def read(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """XYZ over white [3, N] at positions [2, N], and its slopes along melanin and along hemoglobin."""
         across, down = (max(int(n), 1) for n in self.most)
-        i, j = (np.minimum(p.astype("i4"), n - 1) for p, n in zip(at, (across, down), strict=True))
+        i, j = (np.minimum(p.astype("i4"), n - 1) for p, n in zip(nodes, (across, down), strict=True))
         corner, m_slope, h_slope, twist = self.cells[j * across + i].T.reshape(4, 3, -1)
-        m, h = at[0] - i, at[1] - j
+        m, h = nodes[0] - i, nodes[1] - j
         along_m = m_slope + h * twist
         return corner + m * along_m + h * h_slope, along_m, h_slope + m * twist
 
-    def coded(self, at: np.ndarray) -> np.ndarray:
+    def coded(self, nodes: np.ndarray) -> np.ndarray:
         """L* + 16, a*, b* [3, N] at positions [2, N]."""
-        return opponent(roots(self.read(at)[0])[0])
+        return opponent(roots(self.read(nodes)[0])[0])
 
-    def values(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def values(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Melanin and hemoglobin at positions [2, ...]."""
-        return self.melanin.value(at[0]), self.hemoglobin.value(at[1])
+        return self.melanin.value(nodes[0]), self.hemoglobin.value(nodes[1])
 
     @cached_property
     def _starts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Lowest corner [3] and cells per unit [3] of a table over CIELAB, and each cell's nearest skin [2, ..]."""
         grid = np.meshgrid(*(np.linspace(0, n, _STARTS, dtype="f4") for n in self.most), indexing="ij")
-        at = np.stack([g.ravel() for g in grid])
-        known = self.coded(at)
+        nodes = np.stack([g.ravel() for g in grid])
+        known = self.coded(nodes)
         low, high = known.min(axis=1) - np.float32(_MARGIN), known.max(axis=1) + np.float32(_MARGIN)
         cell = (np.indices((_ACROSS,) * 3, "f4").reshape(3, -1) + np.float32(0.5)) / np.float32(_ACROSS)
         centers = low[:, None] + cell * (high - low)[:, None]
         nearest = ((known**2).sum(axis=0) - 2 * centers.T @ known).argmin(axis=1)
-        return low, _ACROSS / (high - low), at[:, nearest]
+        return low, _ACROSS / (high - low), nodes[:, nearest]
 
     def start(self, wanted: np.ndarray) -> np.ndarray:
         """Positions [2, N] to start from toward colors [3, N]."""
-        low, scale, at = self._starts
+        low, scale, nodes = self._starts
         cell = np.zeros(wanted.shape[1], "i4")
         for values, first, per_unit in zip(wanted, low, scale, strict=True):
             cell = cell * _ACROSS + np.clip((values - first) * per_unit, 0, _ACROSS - 1).astype("i4")
-        return at[:, cell]
+        return nodes[:, cell]
 
 
 def of(luts: LutSet, eumelanin: float) -> Surface:
@@ -171,55 +171,55 @@ def nearest(surface: Surface, wanted: np.ndarray, hold: np.ndarray | None = None
 
     `hold` [2, N]: positions to stay near where colors say little.
     """
-    at = np.empty((2, wanted.shape[1]), "f4")
+    nodes = np.empty((2, wanted.shape[1]), "f4")
 
     def _solve(part: slice) -> None:
-        at[:, part] = refined(
+        nodes[:, part] = refined(
             surface, wanted[:, part], surface.start(wanted[:, part]), None if hold is None else hold[:, part]
         )
 
     in_chunks(_solve, wanted.shape[1])
-    return at
+    return nodes
 
 
 def refined(
-    surface: Surface, wanted: np.ndarray, at: np.ndarray, hold: np.ndarray | None = None, reach=_REACH
+    surface: Surface, wanted: np.ndarray, nodes: np.ndarray, hold: np.ndarray | None = None, reach=_REACH
 ) -> np.ndarray:
     """Damped Gauss-Newton steps from positions [2, N] until none moves; what has settled is left alone."""
-    weights = metric((wanted + surface.coded(at)) / 2)
+    weights = metric((wanted + surface.coded(nodes)) / 2)
     pull = [np.float32((_HOLD / max(n, 1)) ** 2 if hold is not None else 0) for n in surface.most]
-    hold = at if hold is None else hold
-    out, moving = at, None
+    hold = nodes if hold is None else hold
+    out, moving = nodes, None
     for most in reach:
-        new = _step(surface, wanted, weights, at, hold, pull, np.float32(most))
-        far = np.abs(new - at).max(axis=0) > _STILL
+        new = _step(surface, wanted, weights, nodes, hold, pull, np.float32(most))
+        far = np.abs(new - nodes).max(axis=0) > _STILL
         if moving is None:
             out = new
         else:
             out[:, moving] = new
-        at = new
+        nodes = new
         if not far.any():
             break
         if far.mean() < 0.7:
             moving = np.flatnonzero(far) if moving is None else moving[far]
-            wanted, weights, at, hold = (v[:, far] for v in (wanted, weights, at, hold))
+            wanted, weights, nodes, hold = (v[:, far] for v in (wanted, weights, nodes, hold))
     return out
 
 
-def _step(surface, wanted, weights, at, hold, pull, reach) -> np.ndarray:
-    xyz, *slopes = surface.read(at)
+def _step(surface, wanted, weights, nodes, hold, pull, reach) -> np.ndarray:
+    xyz, *slopes = surface.read(nodes)
     root, rate = roots(xyz)
     off = seen(weights, wanted - opponent(root))
     jm, jh = (seen(weights, opponent(rate * slope)) for slope in slopes)
-    toward = [_dot(j, off) + p * (to - now) for j, p, to, now in zip((jm, jh), pull, hold, at, strict=True)]
-    stuck = [((p <= 0) & (t < 0)) | ((p >= n) & (t > 0)) for p, t, n in zip(at, toward, surface.most, strict=True)]
+    toward = [_dot(j, off) + p * (to - now) for j, p, to, now in zip((jm, jh), pull, hold, nodes, strict=True)]
+    stuck = [((p <= 0) & (t < 0)) | ((p >= n) & (t > 0)) for p, t, n in zip(nodes, toward, surface.most, strict=True)]
     gm, gh = (np.where(s, np.float32(0), t) for s, t in zip(stuck, toward, strict=True))
     mh = np.where(stuck[0] | stuck[1], np.float32(0), _dot(jm, jh))  # at an axis's end only the other one moves
     mm, hh = ((_dot(j, j) + p) * (1 + _DAMPING) + np.float32(1e-9) for j, p in zip((jm, jh), pull, strict=True))
     scale = 1 / (mm * hh - mh * mh)
     steps = (hh * gm - mh * gh) * scale, (mm * gh - mh * gm) * scale
     return np.stack(
-        [np.clip(p + np.clip(s, -reach, reach), 0, n) for p, s, n in zip(at, steps, surface.most, strict=True)]
+        [np.clip(p + np.clip(s, -reach, reach), 0, n) for p, s, n in zip(nodes, steps, surface.most, strict=True)]
     )
 
 

@@ -79,9 +79,9 @@ def records(
     while start < len(jobs):
         part = jobs[start : start + size]
         bank, results = ocl.buffer(device, 4 * record * BLOCK_PHOTONS * len(part)), np.zeros(len(part), RESULT)
-        found, since = ocl.buffer(device, results), time.perf_counter()
-        ocl.launch(device, kernel, (len(part),), ocl.buffer(device, part), table, bank, found)
-        ocl.read(device, found, results)
+        result_buffer, since = ocl.buffer(device, results), time.perf_counter()
+        ocl.launch(device, kernel, (len(part),), ocl.buffer(device, part), table, bank, result_buffer)
+        ocl.read(device, result_buffer, results)
         if results["unfinished"].any():
             raise MachineError(
                 f"device {device.name}: {results['unfinished'].sum()} photons exceeded the step budget; "
@@ -142,8 +142,8 @@ def shares(layers: list[Layer], photons: int = 100_000, seed: int = 0, **options
     """Where the light goes: diffuse, specular, transmitted, absorbed per layer; options as of `records`.
 
     >>> from lutgen.skin.tissue import Layer
-    >>> found = shares([Layer(2.0, 1.0, 0.0, 0.0, 1.0)], photons=2048)
-    >>> abs(found.transmitted - 0.1353) < 4 * found.transmitted_error  # colored glass without scattering: exp(-2)
+    >>> light = shares([Layer(2.0, 1.0, 0.0, 0.0, 1.0)], photons=2048)
+    >>> abs(light.transmitted - 0.1353) < 4 * light.transmitted_error  # colored glass without scattering: exp(-2)
     True
     """
     sums, squares, total, total_square, events = 0.0, 0.0, 0.0, 0.0, 0
@@ -166,8 +166,8 @@ def reflectance(
     layers: list[Layer], photons: int = 100_000, seed: int = 0, device: str | None = None, **options
 ) -> Reflectance:
     """Diffuse, specular and transmitted share of any stack; options as of `records`."""
-    found = shares(layers, photons, seed, device=ocl.choose(device), **options)
-    return Reflectance(found.diffuse, found.specular, found.transmitted, found.diffuse_error)
+    light = shares(layers, photons, seed, device=ocl.choose(device), **options)
+    return Reflectance(light.diffuse, light.specular, light.transmitted, light.diffuse_error)
 
 
 def profile(

@@ -205,7 +205,10 @@ def trace(
         for (low, high), count in zip((epidermis_range, dermis_range), nodes, strict=True)
     ]
     rates = np.concatenate(mu, axis=1) - medium.nu_per_mm[:, None]
-    at, edges = ocl.buffer(device, rates.astype("f4")), ocl.buffer(device, np.asarray(radius_edges_mm, "f4"))
+    rate_buffer, edge_buffer = (
+        ocl.buffer(device, rates.astype("f4")),
+        ocl.buffer(device, np.asarray(radius_edges_mm, "f4")),
+    )
     sums = np.zeros((K, slices, rings, *nodes), "i8")
     sum_buffer = ocl.buffer(device, sums)
     columns = 1 if device.kind == "cpu" else nodes[1]
@@ -213,7 +216,7 @@ def trace(
     for jobs, _, bank, results in _launches(medium, photons, seed, device, blocks_per_launch, tally):
         counts = [int((jobs["wavelength"] == nm).sum()) for nm in wavelengths]
         first = ocl.buffer(device, np.concatenate([[0], np.cumsum(counts)]).astype("u4"))
-        ocl.launch(device, tabulate, (K * slices, columns), bank, results, first, at, edges, sum_buffer)
+        ocl.launch(device, tabulate, (K * slices, columns), bank, results, first, rate_buffer, edge_buffer, sum_buffer)
         if progress:
             progress(tally)
     energy = ocl.read(device, sum_buffer, sums).sum(axis=1) * (medium.entry / _FIXED_POINT / photons)
@@ -240,8 +243,8 @@ def medium_of(layers: list[Layer], wavelength_nm: float = 0.0) -> Medium:
     in_range("wavelength_nm", wavelength_nm, 0, 1e6)
     thickness = top.thickness_mm if len(layers) == 2 else 0.0
     nu = min(layer.mu_a_per_mm for layer in layers if layer.thickness_mm > 0)
-    one = [np.array([v], float) for v in (wavelength_nm, top.mu_s_per_mm, top.g, nu)]
-    return Medium(one[0], one[1], one[2], one[3], thickness, top.n)
+    columns = [np.array([v], float) for v in (wavelength_nm, top.mu_s_per_mm, top.g, nu)]
+    return Medium(columns[0], columns[1], columns[2], columns[3], thickness, top.n)
 
 
 def ring_sums(

@@ -148,9 +148,9 @@ def read_manifest(folder: Path) -> dict:
         raise InputError(f"{folder}: no LUT set there (no manifest.json); bake one with `lutgen bake`") from error
     except (OSError, ValueError) as error:
         raise InputError(f"{folder}: manifest.json cannot be read ({error}); bake it anew") from error
-    found = manifest.get("format") if isinstance(manifest, dict) else None
-    if type(found) is not int or found != FORMAT:
-        raise InputError(f"{folder}: manifest format = {shown(found)}: this version reads {FORMAT}; bake it anew")
+    version = manifest.get("format") if isinstance(manifest, dict) else None
+    if type(version) is not int or version != FORMAT:
+        raise InputError(f"{folder}: manifest format = {shown(version)}: this version reads {FORMAT}; bake it anew")
     missing = [key for key in (*FACTS, "color_grid", "profile_grid", "error", "files") if key not in manifest]
     if missing or not isinstance(manifest["files"], dict) or not isinstance(manifest["error"], (dict, type(None))):
         raise InputError(
@@ -162,10 +162,10 @@ def read_manifest(folder: Path) -> dict:
 def verify(folder: Path, name: str, manifest: dict) -> None:
     """Raise InputError unless a file of the set is the one that its manifest names."""
     try:
-        found = _sha256(folder / name)
+        digest = _sha256(folder / name)
     except OSError as error:
         raise InputError(f"{folder / name}: cannot be read ({error.strerror}); bake the set anew") from error
-    if found != manifest["files"].get(name):
+    if digest != manifest["files"].get(name):
         raise InputError(f"{folder / name}: is not the file that manifest.json names (SHA-256 differs); bake it anew")
 
 
