@@ -24,6 +24,11 @@ class Bvh:
     triangles: np.ndarray
     numbers: np.ndarray
 
+    @property
+    def width(self) -> int:
+        """Children of a node, W."""
+        return self.children.shape[1]
+
 
 def build(positions: np.ndarray, triangles: np.ndarray, width: int) -> Bvh:
     """The tree over triangles [T, 3] of positions [V, 3] for nodes of `width` children.

@@ -97,20 +97,19 @@ class DeviceScene:
 
 def open_scene(
     device: ocl.Device, luts: LutSet, shape: Mesh, given: Maps, look: Look, size: tuple[int, int],
-    around: np.ndarray | None = None, seed: int = 0, bounces: int = 3,
+    around: np.ndarray | None = None, seed: int = 0, bounces: int = 3, tree: bvh.Bvh | None = None,
 ) -> DeviceScene:  # fmt: skip
     """Upload a head, its maps, a skin and its light; InputError where the LUT set does not cover the look's skin.
 
     `around` is radiance as of `environment.read`; None: the studio. Light reflected from skin to skin is followed
-    `bounces` times.
+    `bounces` times. `tree`: the head's own, of `tree_of`, where several scenes show one head.
     """
     grid = luts.color_lut.grid
     for axis in grid.axes[::-1]:
         in_range(axis.name, getattr(look, axis.name), axis.low, axis.high)
     if look.oxygenation != luts.oxygenation:
         luts = luts.expand(oxygenation=look.oxygenation)
-    width = max(device.lanes, 4)
-    tree = bvh.build(shape.positions_mm, shape.triangles, width)
+    tree = tree_of(device, shape) if tree is None else tree
     textures = {name: _texels(values, PLAIN[name]) for name, values in _named(given, look).items()}
     radiance = _surroundings(around)
     view = _view(luts, look, size, textures, radiance, seed, bounces)
@@ -122,7 +121,14 @@ def open_scene(
         "pore_map": pores.texture(), "environment_map": radiance, "sky": _sky(radiance[..., :3], look),
         "lobe_table": surface.ggx_energy().astype("f4"), "waves": waves(luts, look.oxygenation),
     }  # fmt: skip
-    return DeviceScene(device, luts, shape, view, {name: ocl.buffer(device, arrays[name]) for name, _ in SCENE}, width)
+    return DeviceScene(
+        device, luts, shape, view, {name: ocl.buffer(device, arrays[name]) for name, _ in SCENE}, tree.width
+    )
+
+
+def tree_of(device: ocl.Device, shape: Mesh) -> bvh.Bvh:
+    """The tree over a head's triangles, as wide as the device's lanes."""
+    return bvh.build(shape.positions_mm, shape.triangles, max(device.lanes, 4))
 
 
 def items(scene: DeviceScene, pixels: int) -> int:

@@ -12,6 +12,7 @@ from PIL import Image
 from lutgen.charts import drawing
 from lutgen.charts.document import comparisons, figures, portraits, spectra
 from lutgen.errors import InputError, MachineError
+from lutgen.render import flat_exits
 from lutgen.skin.tissue import PRESETS, Skin, layers, preset
 from lutgen.solvers import adding_doubling, direct
 
@@ -23,7 +24,9 @@ def drawn(tmp_path_factory) -> Path:
     """Every figure, its strips three colors long, its portraits small."""
     pytest.importorskip("matplotlib")
     out = tmp_path_factory.mktemp("figures") / "out"
-    shown = figures.draw(out, steps=3, size=(22, 27))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(flat_exits, "EXITS", 8192)
+        shown = figures.draw(out, steps=3, size=(22, 27))
     assert {path.stem for path in out.iterdir()} == set(shown)
     return out
 

@@ -56,12 +56,13 @@ def portraits(folder: Path, size: tuple[int, int] = SIZE, progress: Callable = d
 def _all(device: ocl.Device, size: tuple[int, int], progress: Callable) -> Iterator[Portrait]:
     luts = lutgen.load()
     models = {kind: subject.model(None, None, maps) for kind, maps in ((BARE, subject.NO_MAPS), (TEXTURED, None))}
+    trees = {kind: device_scene.tree_of(device, shape) for kind, (shape, _) in models.items()}
     for skin in comparisons.TYPES:
         for preset, kind in ((f"source-{skin.lower()}", BARE), (f"source-{skin.lower()}", TEXTURED),
                              (MEASURED[skin], TEXTURED)):  # fmt: skip
             progress(f"portrait: {preset}, {kind}", None)
             look = looks.of_preset(preset, Look() if kind == TEXTURED else Look(bumps=0.0))
-            opened = device_scene.open_scene(device, luts, *models[kind], look, size)
+            opened = device_scene.open_scene(device, luts, *models[kind], look, size, tree=trees[kind])
             levels = SAMPLES if preset != MEASURED[skin] else SAMPLES[-1:]
             for traced, noise in at_samples(opened, levels):
                 pixels = display.picture(traced.rgb, traced.mask, look.exposure)
