@@ -20,7 +20,7 @@ def builtin() -> Mesh:
 
     Millimetres, origin between the ears, +z the face, +y up; cylindrical texture coordinates, their seam at the back.
     """
-    made = cache.kept("head", ("head/builtin", "head/sculpt"), _make)
+    made = cache.load_or_make("head", ("head/builtin", "head/sculpt"), _make)
     return Mesh(made["positions"], made["normals"], made["uv"], made["triangles"], {}, (), "built-in")
 
 

@@ -55,7 +55,7 @@ def _painted(shape: Mesh) -> dict[str, np.ndarray]:
         return {}
     own = shape.attribution == "built-in"
     parts = shape.positions_mm, shape.normals, shape.uv, shape.triangles
-    return cache.kept("maps", _MODULES, lambda: _paint(shape, own), *parts, np.array(own))
+    return cache.load_or_make("maps", _MODULES, lambda: _paint(shape, own), *parts, np.array(own))
 
 
 def _lack(shape: Mesh) -> str:

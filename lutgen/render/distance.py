@@ -67,7 +67,7 @@ def of_mesh(
     size = np.array([cell, *band])
     code = np.frombuffer(ocl.source("render/trace", "render/depth", "render/distance").encode(), "u1")
     key = size, positions, corners, code
-    made = cache.kept(
+    made = cache.load_or_make(
         "depth", ("render/distance", "render/bvh"), lambda: _make(positions, corners, cell, band, device), *key
     )
     return Depths(made["origin_mm"], cell, _unit(cell, band), made["middles"], made["rows"], made["values"], notes)
