@@ -66,7 +66,7 @@ def run(options: Namespace) -> Outcome:
     """An albedo to a folder of maps."""
     start, free = light(options.balance, options.exposure)
     source = Path(options.albedo)
-    out = folders.check_target(options.out, options.force, texture_maps.MADE)
+    out = folders.check_target(options.out, options.force, texture_maps.REPORT)
     if source.resolve().is_relative_to(out):
         raise InputError(f"out = {options.out}: holds the albedo {source}, which would go; give another folder")
     clock, seconds = time.perf_counter(), {}
@@ -100,7 +100,7 @@ def run(options: Namespace) -> Outcome:
             lap("recolor")
         tell("write", None)
         facts = _facts(luts, painted, inversion, residual, options, target, warnings)
-        with folders.whole(options.out, options.force, texture_maps.MADE) as folder:
+        with folders.whole(options.out, options.force, texture_maps.REPORT) as folder:
             layers = maps_folder.layers(luts, inversion, options.absolute)
             maps_folder.write(folder, layers, options.format, recolored, painted.alpha, facts)
             balanced = painted.linear * inversion.gain

@@ -22,7 +22,7 @@ RATIO_RANGE, SURFACE_RANGE, THICKNESS_MM = 4.0, 2.0, 32.0
 RATIOS = ("melanin", "eumelanin", "hemoglobin")
 SURFACE = ("roughness", "specular", "occlusion", "thickness")
 NAMES = (*RATIOS, *SURFACE, "normal", "albedo")
-MADE = "maps.json"
+REPORT = "maps.json"
 """What `lutgen maps` says of the maps it made."""
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
 
@@ -89,18 +89,18 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"maps = {folder}: there is no such folder")
-    found = {}
+    paths = {}
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() in SUFFIXES and path.stem in NAMES:
-            if path.stem in found:
-                raise InputError(f"maps: {path.stem} is there twice, {found[path.stem].name} and {path.name}; keep one")
-            found[path.stem] = path
-    if not found:
+            if path.stem in paths:
+                raise InputError(f"maps: {path.stem} is there twice, {paths[path.stem].name} and {path.name}; keep one")
+            paths[path.stem] = path
+    if not paths:
         raise InputError(f"maps = {folder}: holds none of {', '.join(NAMES)} (as {', '.join(SUFFIXES)})")
-    values = {name: _decoded(name, *read(path)) for name, path in found.items()}
+    values = {name: _decoded(name, *read(path)) for name, path in paths.items()}
     for name in values.keys() - {"normal", "albedo"}:
         if values[name].min() < 0:
-            raise InputError(f"map {found[name]}: holds negative values, down to {values[name].min():g}; mend it")
+            raise InputError(f"map {paths[name]}: holds negative values, down to {values[name].min():g}; mend it")
     below, melanin = under or Maps(), _melanin_of(folder)
     if melanin is not None:
         below = replace(below, albedo=None, full_contrast_melanin=melanin)
@@ -114,9 +114,9 @@ def load(folder: Path, under: Maps | None = None) -> Maps:
 
 
 def _melanin_of(folder: Path) -> float | None:
-    """The median melanin that `lutgen maps` found; None where the folder is not of its making."""
+    """The median melanin that `lutgen maps` reports; None where the folder is not its own."""
     try:
-        return float(json.loads((folder / MADE).read_text())["skin"]["melanin"])
+        return float(json.loads((folder / REPORT).read_text())["skin"]["melanin"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
@@ -126,14 +126,14 @@ def ratio(path: Path) -> np.ndarray:
     return _decoded(Path(path).stem, *read(path))
 
 
-def _decoded(name: str, values: np.ndarray, given: bool) -> np.ndarray:
+def _decoded(name: str, values: np.ndarray, as_values: bool) -> np.ndarray:
     """What a map's texels stand for; thickness as a share of 32 mm."""
     if name in ("normal", "albedo"):
-        if name == "albedo" and not given:
+        if name == "albedo" and not as_values:
             return color.decode_srgb(values)
         return values
     values = values.mean(axis=-1)
-    if given:
+    if as_values:
         return np.minimum(values / THICKNESS_MM, 1) if name == "thickness" else values
     return decode_ratio(values) if name in RATIOS else values * (SURFACE_RANGE if name in SURFACE[:2] else 1.0)
 

@@ -107,8 +107,8 @@ def _tone(luts: LutSet, colors: np.ndarray) -> tuple[float, str]:
     usual = min(ratios_of(luts, None), key=lambda ratio: abs(ratio - white_balance.EUMELANIN))
     fit = white_balance.fitted(luts, colors, [usual], np.ones(3), "both")
     surface = skin_colors.of(luts, usual)
-    at = np.median(skin_colors.nearest(surface, skin_colors.coded(colors * fit.gain)), axis=1)
-    melanin, hemoglobin = (float(v) for v in surface.values(at))
+    positions = np.median(skin_colors.nearest(surface, skin_colors.coded(colors * fit.gain)), axis=1)
+    melanin, hemoglobin = (float(v) for v in surface.values(positions))
     off = np.log(melanin / np.clip(melanin, *_MELANIN)), np.log(hemoglobin / _HEMOGLOBIN)
     score = fit.cost + 0.5 * sum(float(v / _TONE_SPREAD) ** 2 for v in off)
     return score, f"melanin {melanin:.2g} and hemoglobin {hemoglobin:.2g} at a color difference of {fit.cost:.1f}"

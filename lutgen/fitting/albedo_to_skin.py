@@ -78,9 +78,11 @@ def invert(
     gain = np.asarray(gain, float)
     surface = skin_colors.of(luts, eumelanin)
     low = _low(albedo, painted)
-    held = skin_colors.nearest(surface, skin_colors.coded(low.reshape(-1, 3) * gain)).reshape(2, *low.shape[:2])
+    low_positions = skin_colors.nearest(surface, skin_colors.coded(low.reshape(-1, 3) * gain)).reshape(
+        2, *low.shape[:2]
+    )
     size = painted.shape
-    hold = np.stack([texture_maps.resized(one, *size)[painted] for one in held]).astype("f4")
+    hold = np.stack([texture_maps.resized(layer, *size)[painted] for layer in low_positions]).astype("f4")
     wanted = np.empty((3, len(colors)), "f4")
     scale = gain.astype("f4")
 
@@ -88,14 +90,15 @@ def invert(
         wanted[:, part] = skin_colors.coded(colors[part] * scale)
 
     skin_colors.in_chunks(_code, len(colors))
-    at = skin_colors.nearest(surface, wanted, hold)
-    melanin, hemoglobin = surface.values(at)
+    positions = skin_colors.nearest(surface, wanted, hold)
+    melanin, hemoglobin = surface.values(positions)
     ends = [
-        (p <= 0) | (p >= last) if last else np.zeros(p.shape, bool) for p, last in zip(at, surface.most, strict=True)
+        (p <= 0) | (p >= last) if last else np.zeros(p.shape, bool)
+        for p, last in zip(positions, surface.most, strict=True)
     ]
     return Inversion(
         _laid_out(painted, melanin, np.median(melanin)), _laid_out(painted, hemoglobin, np.median(hemoglobin)),
-        _laid_out(painted, _left(surface, wanted, at), 0), _laid_out(painted, ends[0] | ends[1], False),
+        _laid_out(painted, _difference(surface, wanted, positions), 0), _laid_out(painted, ends[0] | ends[1], False),
         painted, gain, eumelanin,
     )  # fmt: skip
 
@@ -123,19 +126,21 @@ def ratios_of(luts: LutSet, eumelanin: float | None) -> list[float]:
     return sorted({*(float(v) for v in axis.values), *usual})
 
 
-def ratios(found: Inversion, low_kept: tuple[float, float] = LOW_KEPT, most: tuple[float, float] = RATIO) -> np.ndarray:
+def ratios(
+    inversion: Inversion, low_kept: tuple[float, float] = LOW_KEPT, most: tuple[float, float] = RATIO
+) -> np.ndarray:
     """Ratio maps [R, C, 3] of melanin, eumelanin (1) and hemoglobin as `lutgen.maps.Maps.chromophores` holds them.
 
     Median 1 each, so that the sliders set the tone; background is 1.
     """
     layers = []
-    for values, kept in zip((found.melanin, found.hemoglobin), low_kept, strict=True):
+    for values, share in zip((inversion.melanin, inversion.hemoglobin), low_kept, strict=True):
         log = np.log(values)
-        if kept < 1:
-            low = _low(log[..., None], found.painted)[..., 0]
-            log = log - (1 - kept) * texture_maps.resized(low, *log.shape)
-        ratio = np.exp(log - np.median(log[found.painted]))
-        layers.append(np.where(found.painted, np.clip(ratio, *most), 1.0))
+        if share < 1:
+            low = _low(log[..., None], inversion.painted)[..., 0]
+            log = log - (1 - share) * texture_maps.resized(low, *log.shape)
+        ratio = np.exp(log - np.median(log[inversion.painted]))
+        layers.append(np.where(inversion.painted, np.clip(ratio, *most), 1.0))
     return np.stack([layers[0], np.ones_like(layers[0]), layers[1]], axis=-1)
 
 
@@ -147,16 +152,16 @@ def _laid_out(painted: np.ndarray, values: np.ndarray, background) -> np.ndarray
     return whole
 
 
-def _left(surface: Surface, wanted: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _difference(surface: Surface, wanted: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """CIEDE2000 differences [N] of colors [3, N] from the skins at positions [2, N]."""
-    left, offset = np.empty(wanted.shape[1], "f4"), np.array([16, 0, 0], "f4")
+    difference, offset = np.empty(wanted.shape[1], "f4"), np.array([16, 0, 0], "f4")
 
     def _compare(part: slice) -> None:
-        shown = surface.coded(at[:, part])
-        left[part] = color.delta_e00(shown.T - offset, wanted[:, part].T - offset)
+        shown = surface.coded(positions[:, part])
+        difference[part] = color.delta_e00(shown.T - offset, wanted[:, part].T - offset)
 
-    skin_colors.in_chunks(_compare, len(left))
-    return left
+    skin_colors.in_chunks(_compare, len(difference))
+    return difference
 
 
 def _low(values: np.ndarray, painted: np.ndarray) -> np.ndarray:

@@ -38,32 +38,33 @@ class Layer:
     exr: str
 
 
-def layers(luts: LutSet, found: Inversion, absolute: bool = False) -> dict[str, Layer]:
-    """The maps by name, first row on top as `found` has them."""
+def layers(luts: LutSet, inversion: Inversion, absolute: bool = False) -> dict[str, Layer]:
+    """The maps by name, first row on top as `inversion` has them."""
     every = (0.0, np.inf)
-    made = albedo_to_skin.ratios(found, (1.0, 1.0), every).astype("f4")
-    result = {}
+    ratios = albedo_to_skin.ratios(inversion, (1.0, 1.0), every).astype("f4")
+    by_name = {}
     for k, name in enumerate(texture_maps.RATIOS):
-        texels = np.cbrt(np.clip(made[..., k], 0, texture_maps.RATIO_RANGE) / np.float32(texture_maps.RATIO_RANGE))
+        texels = np.cbrt(np.clip(ratios[..., k], 0, texture_maps.RATIO_RANGE) / np.float32(texture_maps.RATIO_RANGE))
         meaning = f"ratio of {name} to the skin's, the median"
-        result[name] = Layer(made[..., k], texels, f"{meaning}: {texture_maps.RATIO_RANGE:g} t^3", meaning)
+        by_name[name] = Layer(ratios[..., k], texels, f"{meaning}: {texture_maps.RATIO_RANGE:g} t^3", meaning)
     if absolute:
         grid = luts.color_lut.grid
-        for axis, values in ((grid.melanin, found.melanin), (grid.hemoglobin, found.hemoglobin)):
-            result[f"{axis.name}_absolute"] = Layer(
+        for axis, values in ((grid.melanin, inversion.melanin), (grid.hemoglobin, inversion.hemoglobin)):
+            by_name[f"{axis.name}_absolute"] = Layer(
                 values, axis.warp(values), _axis_formula(axis), f"{axis.name} as it is"
             )
-    left = found.residual
-    result["residual"] = Layer(
-        left, left / np.float32(RESIDUAL_RANGE), f"CIEDE2000 difference from the balanced albedo: {RESIDUAL_RANGE:g} t",
+    residual = inversion.residual
+    by_name["residual"] = Layer(
+        residual, residual / np.float32(RESIDUAL_RANGE),
+        f"CIEDE2000 difference from the balanced albedo: {RESIDUAL_RANGE:g} t",
         "CIEDE2000 difference from the balanced albedo",
     )  # fmt: skip
-    missed = out_of_reach(found)
+    out = out_of_reach(inversion)
     coded = (
         f"{BEYOND:g}: farther than {REACH:g} from any skin (CIEDE2000); {AT_EDGE:g}: at an end of a LUT axis; else 0"
     )
-    result["out_of_reach"] = Layer(missed, missed, coded, coded)
-    return result
+    by_name["out_of_reach"] = Layer(out, out, coded, coded)
+    return by_name
 
 
 def _axis_formula(axis: Axis) -> str:
@@ -73,35 +74,36 @@ def _axis_formula(axis: Axis) -> str:
     return f"{axis.name}: {value}; the LUT's texture coordinate is {shader_axes.texel('t', axis.count)}"
 
 
-def out_of_reach(found: Inversion) -> np.ndarray:
+def out_of_reach(inversion: Inversion) -> np.ndarray:
     """1 where a painted texel is farther from skin than `REACH`, 0.5 where it stands at the LUT's edge, else 0."""
-    coded = np.where(found.at_edge, np.float32(AT_EDGE), np.float32(0))
-    return np.where(found.painted, np.where(found.residual > REACH, np.float32(BEYOND), coded), np.float32(0))
+    coded = np.where(inversion.at_edge, np.float32(AT_EDGE), np.float32(0))
+    return np.where(inversion.painted, np.where(inversion.residual > REACH, np.float32(BEYOND), coded), np.float32(0))
 
 
-def statistics(found: Inversion) -> dict:
+def statistics(inversion: Inversion) -> dict:
     """CIEDE2000 left in painted texels, and their shares out of reach, at an edge, beyond what PNG ratios hold."""
-    left = found.residual[found.painted]
-    skin = found.skin
-    beyond = (found.melanin > texture_maps.RATIO_RANGE * skin[0]) | (
-        found.hemoglobin > texture_maps.RATIO_RANGE * skin[2]
+    residual = inversion.residual[inversion.painted]
+    skin = inversion.skin
+    beyond = (inversion.melanin > texture_maps.RATIO_RANGE * skin[0]) | (
+        inversion.hemoglobin > texture_maps.RATIO_RANGE * skin[2]
     )
-    middle, p95 = np.quantile(left, (0.5, 0.95))
+    middle, p95 = np.quantile(residual, (0.5, 0.95))
     return {
-        "texels": int(left.size), "delta_e00_mean": float(left.mean(dtype=float)), "delta_e00_median": float(middle),
-        "delta_e00_p95": float(p95), "delta_e00_max": float(left.max()),
-        "out_of_reach_share": float(np.mean(left > REACH)),
-        "at_edge_share": float(np.mean(found.at_edge[found.painted])),
-        "beyond_png_ratio_share": float(np.mean(beyond[found.painted])),
+        "texels": int(residual.size), "delta_e00_mean": float(residual.mean(dtype=float)),
+        "delta_e00_median": float(middle), "delta_e00_p95": float(p95), "delta_e00_max": float(residual.max()),
+        "out_of_reach_share": float(np.mean(residual > REACH)),
+        "at_edge_share": float(np.mean(inversion.at_edge[inversion.painted])),
+        "beyond_png_ratio_share": float(np.mean(beyond[inversion.painted])),
     }  # fmt: skip
 
 
 def write(
-    folder: Path, made: dict[str, Layer], kind: str, recolored: np.ndarray | None, alpha: np.ndarray | None, facts: dict
-) -> None:
+    folder: Path, layers: dict[str, Layer], kind: str,
+    recolored: np.ndarray | None, alpha: np.ndarray | None, facts: dict,
+) -> None:  # fmt: skip
     """Write the maps as 16-bit PNG or float EXR, a recolored albedo [R, C, 3] in linear sRGB, and maps.json."""
-    files = {f"{name}.{kind}": layer.png if kind == "png" else layer.exr for name, layer in made.items()}
-    jobs = [(folder / name, layer) for name, layer in zip(files, made.values(), strict=True)]
+    files = {f"{name}.{kind}": layer.png if kind == "png" else layer.exr for name, layer in layers.items()}
+    jobs = [(folder / name, layer) for name, layer in zip(files, layers.values(), strict=True)]
 
     def _put(job: tuple[Path, Layer]) -> None:
         path, layer = job
@@ -116,10 +118,10 @@ def write(
             name = f"recolored.{kind}"
             files[name] = "albedo on the target skin: " + ("sRGB" if kind == "png" else "linear Rec. 709")
             _write_color(folder / name, recolored, alpha)
-        for one in waiting:
-            one.result()
-    said = {"files": files | {"preview.png": "what was given, what the LUT makes of it, the maps"}, **facts}
-    (folder / texture_maps.MADE).write_text(json.dumps(said, indent=1, sort_keys=True) + "\n")
+        for job in waiting:
+            job.result()
+    document = {"files": files | {"preview.png": "what was given, what the LUT makes of it, the maps"}, **facts}
+    (folder / texture_maps.REPORT).write_text(json.dumps(document, indent=1, sort_keys=True) + "\n")
 
 
 def _write_color(path: Path, linear: np.ndarray, alpha: np.ndarray | None) -> None:

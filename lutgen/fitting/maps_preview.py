@@ -19,25 +19,31 @@ _LEFT = np.array([[0xFF, 0xFF, 0xFF], [0xF4, 0xB1, 0x6A], [0xB2, 0x24, 0x1A], [0
 
 
 def draw(
-    luts: LutSet, balanced: np.ndarray, found: Inversion, made: dict[str, Layer], words: str, recolored=None, name=""
+    luts: LutSet,
+    balanced: np.ndarray,
+    inversion: Inversion,
+    layers: dict[str, Layer],
+    words: str,
+    recolored=None,
+    name="",
 ) -> Image.Image:
     """RGB picture, 1200 pixels wide; the balanced albedo and the recolored one [R, C, 3] in linear sRGB."""
-    pick = _fewer(found.painted.shape)
-    painted, thin = found.painted[pick], balanced[pick]
-    skins = [v[pick].ravel() for v in (found.melanin, found.hemoglobin)]
-    surface = skin_colors.of(luts, found.eumelanin)
-    at = np.stack([a.position(v) for a, v in zip((surface.melanin, surface.hemoglobin), skins, strict=True)])
+    pick = _fewer(inversion.painted.shape)
+    painted, thin = inversion.painted[pick], balanced[pick]
+    skins = [v[pick].ravel() for v in (inversion.melanin, inversion.hemoglobin)]
+    surface = skin_colors.of(luts, inversion.eumelanin)
+    positions = np.stack([a.position(v) for a, v in zip((surface.melanin, surface.hemoglobin), skins, strict=True)])
     from_xyz = color.SRGB_FROM_XYZ * (color.XYZ_FROM_SRGB @ np.ones(3))
-    shown = (from_xyz @ surface.read(at.astype("f4"))[0]).T.reshape(thin.shape)
-    share = np.clip(found.residual[pick] / (2 * REACH), 0, 1) * (len(_LEFT) - 1)
-    left = np.stack([np.interp(share, np.arange(len(_LEFT)), channel) for channel in _LEFT.T], axis=-1)
-    melanin, eumelanin, hemoglobin = found.skin
+    shown = (from_xyz @ surface.read(positions.astype("f4"))[0]).T.reshape(thin.shape)
+    share = np.clip(inversion.residual[pick] / (2 * REACH), 0, 1) * (len(_LEFT) - 1)
+    difference_colors = np.stack([np.interp(share, np.arange(len(_LEFT)), channel) for channel in _LEFT.T], axis=-1)
+    melanin, eumelanin, hemoglobin = inversion.skin
     panels = [
-        ("albedo, balanced", "gain " + " ".join(f"{v:.2f}" for v in found.gain), _bytes(thin)),
+        ("albedo, balanced", "gain " + " ".join(f"{v:.2f}" for v in inversion.gain), _bytes(thin)),
         ("the LUT's color", f"eumelanin ratio {eumelanin:.2g}", _bytes(shown)),
-        ("melanin", f"median {100 * melanin:.3g} %", _gray(made["melanin"].texels[pick])),
-        ("hemoglobin", f"median {100 * hemoglobin:.3g} %", _gray(made["hemoglobin"].texels[pick])),
-        ("color difference left", "", left.astype("u1")),
+        ("melanin", f"median {100 * melanin:.3g} %", _gray(layers["melanin"].texels[pick])),
+        ("hemoglobin", f"median {100 * hemoglobin:.3g} %", _gray(layers["hemoglobin"].texels[pick])),
+        ("color difference left", "", difference_colors.astype("u1")),
     ]  # fmt: skip
     if recolored is not None:
         panels.append((f"on {name}", "detail kept", _bytes(recolored[pick])))
@@ -67,8 +73,8 @@ def _scale(canvas: Canvas, right: float, y: float) -> None:
     left, width = right - 150, 110
     canvas.text(left - 6, y, "0", 12, GRAY, "rs")
     for k in range(width):
-        at = k / (width - 1) * (len(_LEFT) - 1)
-        ink = [round(float(np.interp(at, np.arange(len(_LEFT)), channel))) for channel in _LEFT.T]
+        step = k / (width - 1) * (len(_LEFT) - 1)
+        ink = [round(float(np.interp(step, np.arange(len(_LEFT)), channel))) for channel in _LEFT.T]
         canvas.box((left + k, y - 9, left + k + 1, y), "#" + bytes(ink).hex())
     canvas.box((left, y - 9, left + width, y), outline=GRAY)
     canvas.text(right, y, f"{2 * REACH:g}+", 12, INK, "rs")

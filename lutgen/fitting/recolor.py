@@ -32,7 +32,7 @@ def moves(
     same ratio shows less: a flush fades on dark skin. Where the LUT ends before that, light goes on as it does on the
     base: brows on the darkest skin are darker than skin can be.
     """
-    grid, found = luts.color_lut.grid, []
+    grid, curves = luts.color_lut.grid, []
     for k, axis in ((0, grid.melanin), (2, grid.hemoglobin)):
         values = np.geomspace(axis.low, axis.high, _NODES) if axis.low > 0 else np.linspace(axis.low, axis.high, _NODES)
         shown = []
@@ -48,36 +48,36 @@ def moves(
         inside = np.flatnonzero((goal > axis.low) & (goal < axis.high))
         first, end = (int(inside[0]), int(inside[-1])) if len(inside) else (0, _NODES - 1)
         last = np.clip(np.arange(_NODES), first, end)
-        found.append((values, goal, np.exp(shown[0] - shown[0][last])))
-    return found
+        curves.append((values, goal, np.exp(shown[0] - shown[0][last])))
+    return curves
 
 
-def recolored(luts: LutSet, found: Inversion, albedo: np.ndarray, target: tuple[float, float, float]) -> np.ndarray:
+def recolored(luts: LutSet, inversion: Inversion, albedo: np.ndarray, target: tuple[float, float, float]) -> np.ndarray:
     """The inverted albedo [R, C, 3] in linear sRGB on another skin (melanin, eumelanin, hemoglobin), white-balanced.
 
     Its median texel becomes the target's color; background stays as it is. InputError for a skin outside the LUT.
     """
-    curves = moves(luts, found.skin, target)
-    before, after = skin_colors.of(luts, found.eumelanin), skin_colors.of(luts, target[1])
-    inside = found.painted
-    skins = np.stack([found.melanin[inside], found.hemoglobin[inside]]).astype("f4")
-    painted, gain = albedo[inside], found.gain.astype("f4")
-    out = np.array(albedo, "f4")
+    curves = moves(luts, inversion.skin, target)
+    before, after = skin_colors.of(luts, inversion.eumelanin), skin_colors.of(luts, target[1])
+    inside = inversion.painted
+    skins = np.stack([inversion.melanin[inside], inversion.hemoglobin[inside]]).astype("f4")
+    painted, gain = albedo[inside], inversion.gain.astype("f4")
+    result = np.array(albedo, "f4")
     moved = np.empty_like(painted, "f4")
 
     def _move(part: slice) -> None:
         goal = np.stack([np.interp(v, of, to) for v, (of, to, _) in zip(skins[:, part], curves, strict=True)])
         light = [np.interp(v, of, rest).astype("f4") for v, (of, _, rest) in zip(skins[:, part], curves, strict=True)]
-        was, now = _acescg(before, skins[:, part]), _acescg(after, goal)
-        given = _ACESCG @ skin_colors.relative(painted[part] * gain)
-        factor = np.clip(given / np.maximum(was, np.float32(1e-5)), *np.array(_FACTOR, "f4"))
-        moved[part] = np.maximum(_SRGB_FROM_ACESCG @ (now * factor * light[0] * light[1]), 0).T
+        before_acescg, after_acescg = _acescg(before, skins[:, part]), _acescg(after, goal)
+        painted_acescg = _ACESCG @ skin_colors.relative(painted[part] * gain)
+        factor = np.clip(painted_acescg / np.maximum(before_acescg, np.float32(1e-5)), *np.array(_FACTOR, "f4"))
+        moved[part] = np.maximum(_SRGB_FROM_ACESCG @ (after_acescg * factor * light[0] * light[1]), 0).T
 
     skin_colors.in_chunks(_move, len(painted))
-    out[inside] = moved
-    return out
+    result[inside] = moved
+    return result
 
 
 def _acescg(surface: Surface, skins: np.ndarray) -> np.ndarray:
-    at = [axis.position(v) for axis, v in zip((surface.melanin, surface.hemoglobin), skins, strict=True)]
-    return _ACESCG @ surface.read(np.stack(at).astype("f4"))[0]
+    positions = [axis.position(v) for axis, v in zip((surface.melanin, surface.hemoglobin), skins, strict=True)]
+    return _ACESCG @ surface.read(np.stack(positions).astype("f4"))[0]

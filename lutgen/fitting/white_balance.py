@@ -40,19 +40,19 @@ def fitted(luts: LutSet, painted: np.ndarray, ratios: list[float], start: np.nda
 
     `start` [3] is given gain; `free` says what is found beside it: `nothing`, the `exposure`, the `tint` or `both`.
     """
-    some = sample(painted) * start
+    texels = sample(painted) * start
     first = min(ratios, key=lambda ratio: abs(ratio - EUMELANIN))
-    gain, cost, at = _gain(skin_colors.of(luts, first), some, free)
+    gain, cost, positions = _gain(skin_colors.of(luts, first), texels, free)
     if len(ratios) > 1:
         costs = {}
         for ratio in ratios:
             surface, prior = skin_colors.of(luts, ratio), 0.5 * ((ratio - EUMELANIN) / EUMELANIN_SPREAD) ** 2
             for tried in (np.ones(3), gain):
-                off, _, _ = _off_surface(surface, some, tried, at)
+                off, _, _ = _off_surface(surface, texels, tried, positions)
                 moved = np.linalg.lstsq(_basis(free), np.log(tried), rcond=None)[0]
                 costs[ratio, tuple(tried)] = float(np.linalg.norm(off, axis=0).mean() + 0.5 * moved @ moved + prior)
         first, _ = min(costs, key=lambda key: costs[key])
-        gain, cost, at = _gain(skin_colors.of(luts, first), some, free)
+        gain, cost, positions = _gain(skin_colors.of(luts, first), texels, free)
     return Fit(start * gain, float(first), cost)
 
 
@@ -71,11 +71,11 @@ def _basis(free: str) -> np.ndarray:
     return {"nothing": np.zeros((3, 0)), "exposure": exposure, "tint": tint, "both": np.hstack([exposure, tint])}[free]
 
 
-def _gain(surface: Surface, some: np.ndarray, free: str) -> tuple[np.ndarray, float, np.ndarray]:
+def _gain(surface: Surface, texels: np.ndarray, free: str) -> tuple[np.ndarray, float, np.ndarray]:
     """Gain [3], its cost and positions [2, N], by least squares on the distances, reweighted to their mean size."""
     basis = _basis(free)
     amount, best, costs = np.zeros(basis.shape[1]), np.ones(3), []
-    off, slopes, at = _off_surface(surface, some, best, None)
+    off, slopes, positions = _off_surface(surface, texels, best, None)
     while True:
         size = np.linalg.norm(off, axis=0)
         costs.append(float(size.mean() + 0.5 * amount @ amount))
@@ -89,21 +89,21 @@ def _gain(surface: Surface, some: np.ndarray, free: str) -> tuple[np.ndarray, fl
         matrix = np.einsum("lni,lnj,n->ij", along, along, weight) + np.eye(len(amount))
         step = np.linalg.solve(matrix, -np.einsum("lni,ln,n->i", along, off, weight) - amount)
         amount = amount + step * min(1.0, _FAR / max(np.abs(basis @ step).max(), 1e-9))
-        off, slopes, at = _off_surface(surface, some, np.exp(basis @ amount), at)
-    return (best, min(costs), at) if min(costs) < costs[0] - WORTH else (np.ones(3), costs[0], at)
+        off, slopes, positions = _off_surface(surface, texels, np.exp(basis @ amount), positions)
+    return (best, min(costs), positions) if min(costs) < costs[0] - WORTH else (np.ones(3), costs[0], positions)
 
 
-def _off_surface(surface: Surface, some: np.ndarray, gain: np.ndarray, at: np.ndarray | None):
+def _off_surface(surface: Surface, texels: np.ndarray, gain: np.ndarray, positions: np.ndarray | None):
     """Differences from the nearest skins [3, N], their slopes by the log gain of each channel [3, N, 3], positions."""
-    colors = (some * gain).astype("f4")
+    colors = (texels * gain).astype("f4")
     xyz = skin_colors.relative(colors)
     root, rate = skin_colors.roots(xyz)
     wanted = skin_colors.opponent(root)
-    if at is None:
-        at = skin_colors.refined(surface, wanted, surface.start(wanted))
+    if positions is None:
+        positions = skin_colors.refined(surface, wanted, surface.start(wanted))
     else:
-        at = skin_colors.refined(surface, wanted, at, reach=skin_colors.NEAR)
-    skin, *along = surface.read(at)
+        positions = skin_colors.refined(surface, wanted, positions, reach=skin_colors.NEAR)
+    skin, *along = surface.read(positions)
     root_there, rate_there = skin_colors.roots(skin)
     shown = skin_colors.opponent(root_there)
     weights = skin_colors.metric((wanted + shown) / 2)
@@ -115,11 +115,11 @@ def _off_surface(surface: Surface, some: np.ndarray, gain: np.ndarray, at: np.nd
     ], axis=-1)  # fmt: skip
     first = _unit(tangents[0])
     second = _unit(tangents[1] - (first * tangents[1]).sum(axis=0) * first)
-    for tangent, position, last in zip((first, second), at, surface.most, strict=True):
+    for tangent, position, last in zip((first, second), positions, surface.most, strict=True):
         free = np.where((position <= 0) | (position >= last), 0.0, tangent)  # at the edge skins follow no further
         off = off - free * (free * off).sum(axis=0)
         slopes = slopes - free[..., None] * np.einsum("ln,lnc->nc", free, slopes)
-    return off, slopes, at
+    return off, slopes, positions
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -20,8 +20,8 @@ def builtin() -> Mesh:
 
     Millimetres, origin between the ears, +z the face, +y up; cylindrical texture coordinates, their seam at the back.
     """
-    made = cache.load_or_make("head", ("head/builtin", "head/sculpt"), _make)
-    return Mesh(made["positions"], made["normals"], made["uv"], made["triangles"], {}, (), "built-in")
+    arrays = cache.load_or_make("head", ("head/builtin", "head/sculpt"), _make)
+    return Mesh(arrays["positions"], arrays["normals"], arrays["uv"], arrays["triangles"], {}, (), "built-in")
 
 
 def _make() -> dict[str, np.ndarray]:
@@ -30,19 +30,19 @@ def _make() -> dict[str, np.ndarray]:
     u = 0.5 + (turn + _FRONT * np.sin(turn)) / (2 * np.pi)
     around = u[triangles]
     wraps = np.flatnonzero(around.max(axis=1) - around.min(axis=1) > 0.5)
-    again = np.unique(triangles[wraps][around[wraps] < 0.5])  # corners right of the seam, doubled on its left
+    doubled = np.unique(triangles[wraps][around[wraps] < 0.5])  # corners right of the seam, doubled on its left
     number = np.arange(len(positions))
-    number[again] = len(positions) + np.arange(len(again))
+    number[doubled] = len(positions) + np.arange(len(doubled))
     right = around[wraps] < 0.5
     triangles[wraps] = np.where(right, number[triangles[wraps]], triangles[wraps])
-    whole = np.concatenate([np.arange(len(positions)), again])
-    u = np.concatenate([u, u[again] + 1])
+    source = np.concatenate([np.arange(len(positions)), doubled])
+    u = np.concatenate([u, u[doubled] + 1])
     margin = 0.03  # u runs a little beyond 0 to 1 at the seam
     u = np.clip((u + margin) / (1 + 2 * margin), 0, 1)  # beyond only around the pole at the crown
-    v = (positions[whole, 1] - _FLOOR_MM) / _HEIGHT_MM
-    u, v = unfolded(np.stack([u, v], axis=1), triangles, positions[whole, 1] < 90).T
+    v = (positions[source, 1] - _FLOOR_MM) / _HEIGHT_MM
+    u, v = unfolded(np.stack([u, v], axis=1), triangles, positions[source, 1] < 90).T
     return {
-        "positions": positions[whole].astype("f4"), "normals": normals[whole].astype("f4"),
+        "positions": positions[source].astype("f4"), "normals": normals[source].astype("f4"),
         "uv": np.stack([u, v], axis=1).astype("f4"), "triangles": triangles.astype("i4"),
     }  # fmt: skip
 
@@ -67,8 +67,8 @@ def unfolded(uv: np.ndarray, triangles: np.ndarray, movable: np.ndarray, rounds:
         for _ in range(2):
             moved[edges[moved[edges[:, 0]], 1]] = True
         moved &= movable
-        some = edges[moved[edges[:, 0]]]
+        pairs = edges[moved[edges[:, 0]]]
         for _ in range(250):
-            middle = [np.bincount(some[:, 0], uv[some[:, 1], k], len(uv))[moved] for k in (0, 1)]
+            middle = [np.bincount(pairs[:, 0], uv[pairs[:, 1], k], len(uv))[moved] for k in (0, 1)]
             uv[moved] = np.stack(middle, axis=1) / count[moved, None]
     return uv

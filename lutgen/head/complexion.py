@@ -13,7 +13,7 @@ def _noise(p: np.ndarray, seed: int) -> np.ndarray:
     """Smooth noise in 0 to 1 at points [..., 3], one cell per unit."""
     table = np.random.default_rng(seed).random(4096).astype("f4")
     flat = np.asarray(p, "f4").reshape(-1, 3)
-    found = np.empty(len(flat), "f4")
+    noise = np.empty(len(flat), "f4")
     for start in range(0, len(flat), 1 << 16):  # parts that stay in the processor's cache
         part = flat[start : start + (1 << 16)]
         cell = np.floor(part)
@@ -21,11 +21,11 @@ def _noise(p: np.ndarray, seed: int) -> np.ndarray:
         x, y, z = (w * w * (3 - 2 * w) for w in (x, y, z))
         keys = (cell.astype(np.int64) + np.arange(2)[:, None, None]) * [73856093, 19349663, 83492791]
         near = [[keys[i, :, 0] ^ keys[j, :, 1] for j in (0, 1)] for i in (0, 1)]
-        at = [[[table[(near[i][j] ^ keys[k, :, 2]) & 4095] for k in (0, 1)] for j in (0, 1)] for i in (0, 1)]
-        rows = [[a + (b - a) * z for a, b in pair] for pair in at]
+        corners = [[[table[(near[i][j] ^ keys[k, :, 2]) & 4095] for k in (0, 1)] for j in (0, 1)] for i in (0, 1)]
+        rows = [[a + (b - a) * z for a, b in pair] for pair in corners]
         low, high = (a + (b - a) * y for a, b in rows)
-        found[start : start + (1 << 16)] = low + (high - low) * x
-    return found.reshape(p.shape[:-1])
+        noise[start : start + (1 << 16)] = low + (high - low) * x
+    return noise.reshape(p.shape[:-1])
 
 
 def _mottled(p: np.ndarray, octaves: int, seed: int) -> np.ndarray:
@@ -45,10 +45,10 @@ def _within(p: np.ndarray, low, high, far: float, distance: Callable) -> np.ndar
     """A distance function of x, y, z at positions in a box (of |x|, y, z); `far` elsewhere, where it is not asked."""
     q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1)
     inside = np.all((q > low) & (q < high), axis=-1)
-    found = np.full(p.shape[:-1], far, "f4")
+    distances = np.full(p.shape[:-1], far, "f4")
     if inside.any():
-        found[inside] = distance(tuple(q[inside].astype("f4").T))
-    return found
+        distances[inside] = distance(tuple(q[inside].astype("f4").T))
+    return distances
 
 
 FLUSHED = (
@@ -69,15 +69,17 @@ def pigments(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     in_ear = _smooth(3, -1, _within(p, (55, -45, -50), (110, 40, 10), 9.0, sculpt.ear))
     eye = _spot(p, (31, -4, 74), 12)
 
-    hemoglobin = 1 + 0.8 * in_ear + sum(gain * _spot(p, at, size) for gain, at, size in FLUSHED)
+    hemoglobin = 1 + 0.8 * in_ear + sum(gain * _spot(p, center, size) for gain, center, size in FLUSHED)
     hemoglobin *= 1 + 0.45 * _mottled(p / 12, 3, 3) + 0.45 * _mottled(p / 3.4, 3, 5) + 0.2 * _mottled(p / 0.9, 2, 6)
     hemoglobin *= 1 + 3.4 * lip * (1 + 0.5 * _mottled(p / 1.6, 2, 7))
     melanin = 1 + 0.4 * _mottled(p / 18, 3, 21) + 0.3 * _mottled(p / 2.6, 3, 23) + 0.25 * eye
     melanin -= 0.1 * lip + 0.12 * _spot(p, (38, -28, 62), 16)
     where = np.clip(_spot(p, (26, -20, 76), 18) + _spot(p, (0, -14, 95), 13) + 0.3 * _spot(p, (0, 40, 80), 30), 0, 1)
     melanin *= 1 + 0.9 * _freckles(p, where + 0.04)
-    for radius, at in MOLES:
-        melanin *= 1 + 2.2 * _smooth(1.25, 0.6, np.linalg.norm((p - at) * [1, 1, 0.6], axis=-1) / radius + 0.5 * wobble)
+    for radius, center in MOLES:
+        melanin *= 1 + 2.2 * _smooth(
+            1.25, 0.6, np.linalg.norm((p - center) * [1, 1, 0.6], axis=-1) / radius + 0.5 * wobble
+        )
 
     hairs = hair.cover(p)
     melanin *= 1 + 17 * hairs**1.35  # color falls steeply with the first melanin: half a hair is no orange one
@@ -98,15 +100,15 @@ def _spot(p: np.ndarray, center, radius_mm: float) -> np.ndarray:
 
 def _freckles(p: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Round soft dots of several sizes and strengths, in a share of the places where one may be."""
-    found = np.zeros(p.shape[:-1], "f4")
+    darkness = np.zeros(p.shape[:-1], "f4")
     for size, seed in ((3.6, 31), (2.1, 37), (1.4, 39)):
         cell = np.floor(p / size)
         hashed = (cell.astype(np.int64) @ np.array([73856093, 19349663, 83492791])) & 4095
         place, chance, strength = np.split(np.random.default_rng(seed).random((4096, 5))[hashed], [3, 4], axis=-1)
         apart = np.linalg.norm(p / size - cell - (0.32 + 0.36 * place), axis=-1)
         radius = 0.14 + 0.18 * strength[..., 0]
-        found += _smooth(1, 0.2, apart / radius) * (0.25 + 0.75 * strength[..., 0]) * (chance[..., 0] < 0.55 * share)
-    return found
+        darkness += _smooth(1, 0.2, apart / radius) * (0.25 + 0.75 * strength[..., 0]) * (chance[..., 0] < 0.55 * share)
+    return darkness
 
 
 def gloss(p: np.ndarray, lip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -152,11 +154,11 @@ def _wrinkles(p: np.ndarray) -> np.ndarray:
     x, y = np.abs(p[..., 0]), p[..., 1]
     bend = 2.5 * _mottled(p / 14, 2, 91)
     forehead = np.exp(-np.abs(np.sin((y + bend + 0.002 * x * x) * np.pi / 11)) / 0.10)
-    found = -0.05 * forehead * _spot(p, (0, 46, 80), 22) * (0.5 + _mottled(p / 12, 2, 93))
+    height = -0.05 * forehead * _spot(p, (0, 46, 80), 22) * (0.5 + _mottled(p / 12, 2, 93))
     angle = np.degrees(np.arctan2(y + 4, np.maximum(x - 42, 0.1)))
     rays = np.exp(-np.abs(np.sin((angle + 6 * bend) * np.pi / 17)) / 0.16)
-    found -= 0.06 * rays * np.exp(-(((np.hypot(x - 42, y + 4) - 12) / 5) ** 2)) * (x > 43) * (p[..., 2] > 20)
+    height -= 0.06 * rays * np.exp(-(((np.hypot(x - 42, y + 4) - 12) / 5) ** 2)) * (x > 43) * (p[..., 2] > 20)
     below = np.exp(-np.abs(np.sin((y + 0.012 * (x - 31) ** 2 + 0.35 * bend) * np.pi / 2.1)) / 0.25)
-    found -= 0.035 * below * _spot(p, (31, -15, 76), 6.5)
+    height -= 0.035 * below * _spot(p, (31, -15, 76), 6.5)
     lid = np.exp(-np.abs(np.sin((y + 0.02 * (x - 31) ** 2 + 0.3 * bend) * np.pi / 1.6)) / 0.3)
-    return found - 0.02 * lid * _spot(p, (31, 1, 76), 6)
+    return height - 0.02 * lid * _spot(p, (31, 1, 76), 6)

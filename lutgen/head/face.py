@@ -49,9 +49,9 @@ class Placement:
         z = (points[..., 2] - self.foremost_mm[0]) / self.scale + self.foremost_mm[1]
         if self.ear is not None:
             share = _fading(np.abs(x), 50, 62) * _inside(z, y, _EAR_MM, 12)
-            at, to, size = self.ear
-            z = z + share * (to[0] + (z - at[0]) / size[0] - z)
-            y = y + share * (to[1] + (y - at[1]) / size[1] - y)
+            own, known, size = self.ear
+            z = z + share * (known[0] + (z - own[0]) / size[0] - z)
+            y = y + share * (known[1] + (y - own[1]) / size[1] - y)
         if self.relief_mm is not None:
             z = z + _read(self.relief_mm, x, y, _FACE_MM) * _inside(x, y, _FACE_MM, 15) * _fading(z, 10, 40)
         if self.flare_mm is not None:
@@ -82,8 +82,8 @@ def place(shape: Mesh) -> Placement | None:
     tip = landmarks.tip_of(own, known)
     if tip is None:
         return None
-    at, scale = tip
-    heights = landmarks.landmarks(own, known, at, scale)
+    tip_y, scale = tip
+    heights = landmarks.landmarks(own, known, tip_y, scale)
     if heights is None:
         return None
     scale = float(np.ptp(heights[:, 0]) / np.ptp(heights[:, 1]))
@@ -112,10 +112,10 @@ def _known_points() -> np.ndarray:
 def _map(points: np.ndarray, extent: np.ndarray) -> np.ndarray:
     """Highest third coordinate [rows, columns] of points [3, N] in cells over an extent of the first two; NaN: none."""
     columns, rows = (np.ptp(extent, axis=1) / _CELL_MM).astype(int)
-    at = ((points[:2] - extent[:, :1]) / _CELL_MM).astype(int)
+    cells = ((points[:2] - extent[:, :1]) / _CELL_MM).astype(int)
     inside = np.all((points[:2] >= extent[:, :1]) & (points[:2] < extent[:, 1:]), axis=0)
     top = np.full(rows * columns, -np.inf)
-    np.maximum.at(top, at[1, inside] * columns + at[0, inside], points[2, inside])
+    np.maximum.at(top, cells[1, inside] * columns + cells[0, inside], points[2, inside])
     return np.where(np.isfinite(top), top, np.nan).reshape(rows, columns)
 
 
@@ -202,10 +202,10 @@ def _ear(points: np.ndarray) -> np.ndarray | None:
             _EAR_MM[k, 0] + (np.arange(n) + 0.5) * _CELL_MM for k, n in ((1, seen.shape[0]), (0, seen.shape[1]))
         )
         z, y = np.meshgrid(columns, rows)
-        at = np.array([(weight * v).sum() for v in (z, y)]) / weight.sum()
+        middle = np.array([(weight * v).sum() for v in (z, y)]) / weight.sum()
         spread = np.sqrt(
-            np.array([(weight * (v - m) ** 2).sum() for v, m in zip((z, y), at, strict=True)]) / weight.sum()
+            np.array([(weight * (v - m) ** 2).sum() for v, m in zip((z, y), middle, strict=True)]) / weight.sum()
         )
-        middles.append((at, spread))
+        middles.append((middle, spread))
     (own, wide), (known, usual) = middles
     return np.array([own, own + np.clip(known - own, -25, 25), np.clip(wide / usual, 0.75, 1.35)])

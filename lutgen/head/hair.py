@@ -16,35 +16,35 @@ _STEPS = 5
 
 def cover(p: np.ndarray) -> np.ndarray:
     """Share of the skin that brows and lashes hide, 0 to 1, at positions [..., 3]; left and right grow differently."""
-    found = np.zeros(p.shape[:-1], "f4")
+    hidden = np.zeros(p.shape[:-1], "f4")
     for side in (-1, 1):
         x, y = side * p[..., 0], p[..., 1]
         near = (x > 2) & (x < 58) & (y > -20) & (y < 34) & (p[..., 2] > 35)
         if near.any():
-            at = np.stack([x[near], y[near]], axis=-1).astype("f4")
+            places = np.stack([x[near], y[near]], axis=-1).astype("f4")
             strands = [_brow(np.random.default_rng(41 + side)), _lashes(np.random.default_rng(51 + side))]
-            bare = np.prod([_bare(at, *several) for several in strands], axis=0)
-            found[near] = 1 - bare * (1 - 0.16 * _shade(at)) * (1 - _margin(at))
-    return found
+            bare = np.prod([_bare(places, *several) for several in strands], axis=0)
+            hidden[near] = 1 - bare * (1 - 0.16 * _shade(places)) * (1 - _margin(places))
+    return hidden
 
 
-def _bare(at: np.ndarray, lines: np.ndarray, radius_mm: np.ndarray, strength: np.ndarray) -> np.ndarray:
+def _bare(places: np.ndarray, lines: np.ndarray, radius_mm: np.ndarray, strength: np.ndarray) -> np.ndarray:
     """Skin left free at places [N, 2] by hairs along lines [H, steps, 2] that thin out toward their tips."""
-    free = np.ones(len(at), "f4")
-    order = np.argsort(at[:, 0])
-    sorted_x = at[order, 0]
+    free = np.ones(len(places), "f4")
+    order = np.argsort(places[:, 0])
+    sorted_x = places[order, 0]
     for line, radius, strong in zip(lines.astype("f4"), radius_mm, strength, strict=True):
         low, high = line[:, 0].min() - 0.5, line[:, 0].max() + 0.5
-        some = order[np.searchsorted(sorted_x, low) : np.searchsorted(sorted_x, high)]
-        some = some[np.abs(at[some, 1] - line[:, 1].mean()) < 0.6 + np.ptp(line[:, 1])]
-        q, least, along = at[some], np.full(len(some), 9.0, "f4"), np.zeros(len(some), "f4")
+        nearby = order[np.searchsorted(sorted_x, low) : np.searchsorted(sorted_x, high)]
+        nearby = nearby[np.abs(places[nearby, 1] - line[:, 1].mean()) < 0.6 + np.ptp(line[:, 1])]
+        q, least, along = places[nearby], np.full(len(nearby), 9.0, "f4"), np.zeros(len(nearby), "f4")
         for k, (a, b) in enumerate(pairwise(line)):
             t = np.clip((q - a) @ (b - a) / ((b - a) @ (b - a) + 1e-9), 0, 1)
             apart = np.hypot(*(q - a - t[:, None] * (b - a)).T)
             nearer = apart < least
             least, along = np.where(nearer, apart, least), np.where(nearer, k + t, along)
         width = radius * (1 - 0.75 * along / (len(line) - 1))
-        free[some] *= 1 - strong * np.clip((width + 0.09 - least) / 0.18, 0, 1)  # an edge as soft as a texel
+        free[nearby] *= 1 - strong * np.clip((width + 0.09 - least) / 0.18, 0, 1)  # an edge as soft as a texel
     return free
 
 
@@ -83,16 +83,16 @@ def _lashes(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return _curved(root, way, length, bend), np.full(LASHES, 0.075), 0.35 + 0.35 * rng.random(LASHES)
 
 
-def _shade(at: np.ndarray) -> np.ndarray:
+def _shade(places: np.ndarray) -> np.ndarray:
     """Hairs too fine to be drawn under the brow's."""
-    x, y = at.T
+    x, y = places.T
     height = np.interp(x, [6, 12, 20, 36, 51], [1.8, 3.6, 3.6, 2.6, 0.8])
     off = (y - np.interp(x, *np.array(BROW_MM).T) - 0.3) / height
     return np.exp(-(off**2)) * np.interp(x, [5, 11, 42, 52], [0, 1, 1, 0])
 
 
-def _margin(at: np.ndarray) -> np.ndarray:
+def _margin(places: np.ndarray) -> np.ndarray:
     """The row of lash roots along the lid's edge."""
-    x, y = at.T
+    x, y = places.T
     apart = y - np.interp(x, *np.array(sculpt.SLIT_MM).T[:2])
     return 0.45 * np.exp(-((apart / 0.45) ** 2)) * np.interp(x, [16, 20, 44, 48], [0, 1, 1, 0])

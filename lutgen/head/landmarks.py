@@ -41,9 +41,9 @@ def tip_of(own: Profile, known: Profile) -> tuple[float, float] | None:
     for k in candidates:
         scales = _SCALES[(y[k] - _BELOW_MM * _SCALES > y[0]) & (y[k] + _ABOVE_MM * _SCALES < y[-1])]
         for scale in scales:
-            found = (np.interp(y[k] + scale * off, y, z) - z[k]) / scale
+            relief = (np.interp(y[k] + scale * off, y, z) - z[k]) / scale
             size = _size(y, z, float(y[k]), float(scale)) / usual
-            misfit = np.minimum(np.abs(found - expected), _WORST_MM).mean() + _UNLIKE_MM * abs(np.log(size / scale))
+            misfit = np.minimum(np.abs(relief - expected), _WORST_MM).mean() + _UNLIKE_MM * abs(np.log(size / scale))
             best = min(best, (float(misfit), float(y[k]), float(scale)))
     return best[1:] if best[0] < _MISFIT_MM else None
 

@@ -59,7 +59,7 @@ def of(name: str, mm_per_unit: float | None = None, flip_v: bool = False) -> Mes
         return scan(name)
     path = Path(name)
     mark = _sha256(path) if path.is_file() else ""
-    known = next((one for one in SCANS.values() if one["files"]["head"][1] == mark), None)
+    known = next((entry for entry in SCANS.values() if entry["files"]["head"][1] == mark), None)
     return load(path, mm_per_unit, flip_v) if known is None else _scanned(known, path, mm_per_unit)
 
 
@@ -147,12 +147,12 @@ def _pictures(whole) -> dict[str, np.ndarray]:
     """Pictures of a mesh's material, 8-bit, first row lowest."""
     material = getattr(whole.visual, "material", None)
     named = {"albedo": ("baseColorTexture", "image"), "normal": ("normalTexture",)}
-    found = {}
+    pictures = {}
     for name, attributes in named.items():
         picture = next((p for p in (getattr(material, a, None) for a in attributes) if p is not None), None)
         if picture is not None:
-            found[name] = np.asarray(picture.convert("RGB"))[::-1].copy()
-    return found
+            pictures[name] = np.asarray(picture.convert("RGB"))[::-1].copy()
+    return pictures
 
 
 def normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -178,7 +178,7 @@ def scan(name: str) -> Mesh:
 def _scanned(known: dict, path: Path, mm_per_unit: float | None, pictures: dict[str, Path] | None = None) -> Mesh:
     """A known scan from its file, with its pictures from where they are said to be or from beside it."""
     shape = load(path, known["mm_per_unit"] if mm_per_unit is None else mm_per_unit, known["flip_v"])
-    found, notes = {}, list(shape.notes)
+    textures, notes = {}, list(shape.notes)
     for part, short in _SHORT_NAMES.items():
         url, mark = known["files"][part]
         beside = [path.parent / name for name in (short, Path(url).name)]
@@ -187,8 +187,8 @@ def _scanned(known: dict, path: Path, mm_per_unit: float | None, pictures: dict[
         if place is None:
             notes.append(f"the scan's {part} map does not lie beside it ({short} or {Path(url).name}): left out")
             continue
-        found[part] = images.read(place, "picture").pixels[::-1].copy()
-    return replace(shape, textures=found, notes=tuple(notes), attribution=known["attribution"])
+        textures[part] = images.read(place, "picture").pixels[::-1].copy()
+    return replace(shape, textures=textures, notes=tuple(notes), attribution=known["attribution"])
 
 
 def _sha256(path: Path) -> str:

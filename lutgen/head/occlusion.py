@@ -31,20 +31,32 @@ def around(positions_mm: np.ndarray, normals: np.ndarray, triangles: np.ndarray)
     seen, sky, deep, cone = (np.zeros(len(n)) for _ in range(4))
     for axis in _hemisphere(AXES):
         frame = np.stack([*_across(axis), axis])
-        at, here, above = frame @ samples, frame @ p, frame @ raised
-        low = np.minimum(at.min(axis=1), above.min(axis=1))[:2, None] - 2 * cell
-        shape = tuple(int(k) + 3 for k in (np.maximum(at.max(axis=1), above.max(axis=1))[:2] - low[:, 0]) / cell)
-        place = _cells(at, low, cell, shape)
+        cloud, vertices, lifted = frame @ samples, frame @ p, frame @ raised
+        low = np.minimum(cloud.min(axis=1), lifted.min(axis=1))[:2, None] - 2 * cell
+        shape = tuple(int(k) + 3 for k in (np.maximum(cloud.max(axis=1), lifted.max(axis=1))[:2] - low[:, 0]) / cell)
+        place = _cells(cloud, low, cell, shape)
         for sign in (1.0, -1.0):
             cosine = sign * (n @ axis)
             near = np.flatnonzero(cosine > 0)
-            free = _free(place, sign * at[2], sign * above[2, near], above[:, near], cosine[near], low, cell, shape)
+            free = _free(
+                place,
+                sign * cloud[2],
+                sign * lifted[2, near],
+                lifted[:, near],
+                cosine[near],
+                low,
+                cell,
+                shape,
+            )
             seen[near] += cosine[near] * free
             sky[near] += cosine[near]
             near = np.flatnonzero(cosine > _CONE)
             away = np.flatnonzero(sign * (axis @ facing) < 0)
             way = _way_in(
-                place[away], sign * at[2, away], _cells(here[:, near], low, cell, shape), sign * here[2, near]
+                place[away],
+                sign * cloud[2, away],
+                _cells(vertices[:, near], low, cell, shape),
+                sign * vertices[2, near],
             )
             deep[near] += cosine[near] * np.minimum(way * cosine[near], THICKEST_MM)
             cone[near] += cosine[near]
@@ -72,8 +84,8 @@ def sampled(p: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.nd
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     opposite = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2).argmax(axis=1)
     order = (opposite[:, None] + np.arange(3)) % 3  # the corner across from the longest edge first
-    first, one, two = np.take_along_axis(corners, order[..., None], axis=1).transpose(1, 0, 2)
-    sides = np.stack([one - first, two - first])
+    first, second, third = np.take_along_axis(corners, order[..., None], axis=1).transpose(1, 0, 2)
+    sides = np.stack([second - first, third - first])
     counts = np.unique(np.ceil(1.2 ** np.arange(50))).astype(int)  # few, so that triangles go in groups
     parts = np.searchsorted(counts, np.linalg.norm(sides, axis=2) / spacing)
     points, facing = [], []
@@ -87,13 +99,13 @@ def sampled(p: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.nd
     return tuple(np.ascontiguousarray(np.concatenate(part).T) for part in (points, facing))
 
 
-def _cells(at: np.ndarray, low: np.ndarray, cell: float, shape: tuple[int, ...]) -> np.ndarray:
+def _cells(projected: np.ndarray, low: np.ndarray, cell: float, shape: tuple[int, ...]) -> np.ndarray:
     """Number [N] of the cell that projected points [3, N] fall into."""
-    i, j = ((at[:2] - low) / cell).astype(int)
+    i, j = ((projected[:2] - low) / cell).astype(int)
     return i * shape[1] + j
 
 
-def _free(place, height, over, at, cosine, low, cell: float, shape) -> np.ndarray:
+def _free(place, height, over, projected, cosine, low, cell: float, shape) -> np.ndarray:
     """How free the view outward is, 0 to 1, from points lifted off the surface: four cells, linearly mixed.
 
     A tilted surface rises within its cell, so what is to count as in the way must rise more.
@@ -101,10 +113,10 @@ def _free(place, height, over, at, cosine, low, cell: float, shape) -> np.ndarra
     top = np.full(shape[0] * shape[1], -np.inf)
     np.maximum.at(top, place, height)
     slack = cell * (0.3 + 1.2 * np.minimum(np.sqrt(1 - np.minimum(cosine, 1) ** 2) / np.maximum(cosine, 1e-3), 6))
-    corner = (at[:2] - low) / cell - 0.5
+    corner = (projected[:2] - low) / cell - 0.5
     first = corner.astype(int)
     along = corner - first
-    free = np.zeros(at.shape[1])
+    free = np.zeros(projected.shape[1])
     for i, j in np.ndindex(2, 2):
         weight = np.abs(1 - i - along[0]) * np.abs(1 - j - along[1])
         free += weight * (top[(first[0] + i) * shape[1] + first[1] + j] <= over + slack)
@@ -119,7 +131,7 @@ def _way_in(place, height, cells, over) -> np.ndarray:
     span = max(height.max(), over.max() if len(over) else 0) - lowest + 2.0
     keys = np.sort(place * span + (height - lowest))  # cell by cell, from the lowest up
     wanted = cells * span + (over - lowest) - 0.2
-    found = np.searchsorted(keys, wanted) - 1
-    key = keys[np.maximum(found, 0)]
-    inside = (found >= 0) & (key >= cells * span - 0.5)
+    below = np.searchsorted(keys, wanted) - 1
+    key = keys[np.maximum(below, 0)]
+    inside = (below >= 0) & (key >= cells * span - 0.5)
     return np.where(inside, wanted + 0.2 - key, np.inf)

@@ -28,8 +28,8 @@ def paint(shape: Mesh) -> dict[str, Any]:
 
     As `lutgen.maps.Maps` holds them; kept in the cache. Without texture coordinates none are made.
     """
-    made = _painted(shape)
-    return {name: made[name] for name in ("chromophores", "surface", "normal") if name in made}
+    maps = _painted(shape)
+    return {name: maps[name] for name in ("chromophores", "surface", "normal") if name in maps}
 
 
 def notes(shape: Mesh) -> tuple[str, ...]:
@@ -37,8 +37,8 @@ def notes(shape: Mesh) -> tuple[str, ...]:
     lack = "" if shape.uv is None else _lack(shape)
     if lack:
         return (f"texture coordinates {lack}: freckles, occlusion and thickness are left out; unwrap the mesh",)
-    made = _painted(shape)
-    if "face" in made and not made["face"]:
+    maps = _painted(shape)
+    if "face" in maps and not maps["face"]:
         return (
             "no face found (+y up, +z forward, nose foremost on the midline): lips, flush and freckles are left out",
         )
@@ -96,7 +96,7 @@ def _in_texture(shape: Mesh, values: np.ndarray, size: int) -> np.ndarray:
     side = (np.ceil(corners.max(axis=1)).astype(int) - first).max(axis=1)
     a, b, c = np.moveaxis(corners, 1, 0)
     turns = np.linalg.inv(np.where(_flat(a, b, c)[:, None, None], np.eye(2), np.stack([b - a, c - a], axis=-1)))
-    out = np.full((size, size, values.shape[1]), np.nan, "f4")
+    picture = np.full((size, size, values.shape[1]), np.nan, "f4")
     for low, high in pairwise([0, *2 ** np.arange(1, 16)]):  # boxes of like sizes together
         group = np.flatnonzero((side > low) & (side <= high) & ~_flat(a, b, c))
         if not len(group):
@@ -107,10 +107,10 @@ def _in_texture(shape: Mesh, values: np.ndarray, size: int) -> np.ndarray:
             along = (texel + 0.5 - a[part][:, None]) @ turns[part].transpose(0, 2, 1)
             w = np.concatenate([1 - along.sum(axis=-1, keepdims=True), along], axis=-1)
             k, inside = np.nonzero((w >= -1e-9).all(axis=-1))
-            at = texel[k, inside] % size
+            texels = texel[k, inside] % size
             corner = values[shape.triangles[part[k]]]
-            out[at[:, 1], at[:, 0]] = np.einsum("nk,nkc->nc", w[k, inside].astype("f4"), corner)
-    return _filled(out)
+            picture[texels[:, 1], texels[:, 0]] = np.einsum("nk,nkc->nc", w[k, inside].astype("f4"), corner)
+    return _filled(picture)
 
 
 def _flat(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

@@ -70,16 +70,16 @@ def _lines(rng: np.random.Generator, apart_mm: float, width_mm: float, depth_mm:
     """Grooves between the cells of a net: the two nearest places are as far there (Worley 1996); bent a little."""
     places = _scattered(rng, apart_mm)
     n = len(places)
-    at = (np.arange(TEXELS) + 0.5) * SIDE_MM / TEXELS
-    bent = np.stack(np.meshgrid(at, at, indexing="ij"), -1) + np.stack([_bumps(rng, 1.2, 0.09) for _ in "xy"], -1)
-    cell = np.floor(at / SIDE_MM * n).astype(int)
-    found = []
+    line = (np.arange(TEXELS) + 0.5) * SIDE_MM / TEXELS
+    bent = np.stack(np.meshgrid(line, line, indexing="ij"), -1) + np.stack([_bumps(rng, 1.2, 0.09) for _ in "xy"], -1)
+    cell = np.floor(line / SIDE_MM * n).astype(int)
+    distances = []
     for i, j in np.ndindex(5, 5):
         row, column = cell + i - 2, cell + j - 2
         around = places[row[:, None] % n, column[None] % n]
         shift = SIDE_MM * np.stack(np.broadcast_arrays((row // n)[:, None], (column // n)[None]), axis=-1)
-        found.append(np.hypot(*np.moveaxis(around + shift - bent, -1, 0)))
-    first, second = np.partition(np.array(found), 1, axis=0)[:2]
+        distances.append(np.hypot(*np.moveaxis(around + shift - bent, -1, 0)))
+    first, second = np.partition(np.array(distances), 1, axis=0)[:2]
     grooves = -depth_mm * np.exp(-(((second - first) / width_mm) ** 2))
     return np.roll(grooves, rng.integers(0, TEXELS, 2), axis=(0, 1))  # else the nets' cells would end at one line
 

@@ -49,9 +49,9 @@ def _ellipsoid(p: Points, center, radii, **turns: float):
         if about in turns:
             q = _turned(q, about, turns[about])
     k = [np.float32(1 / r) for r in radii]
-    one = np.sqrt(sum((v * a) ** 2 for v, a in zip(q, k, strict=True))) + np.float32(1e-9)
-    two = np.sqrt(sum((v * a * a) ** 2 for v, a in zip(q, k, strict=True))) + np.float32(1e-9)
-    return one * (one - 1) / two
+    scaled = np.sqrt(sum((v * a) ** 2 for v, a in zip(q, k, strict=True))) + np.float32(1e-9)
+    slope = np.sqrt(sum((v * a * a) ** 2 for v, a in zip(q, k, strict=True))) + np.float32(1e-9)
+    return scaled * (scaled - 1) / slope
 
 
 def _rod(p: Points, start, end, radius: float, radius_end: float | None = None):
@@ -68,12 +68,12 @@ def _curve(p: Points, points, radii):
     points = np.array(points, float)
     radii = np.broadcast_to(np.array(radii, float), len(points))
     padded = np.vstack([2 * points[0] - points[1], points, 2 * points[-1] - points[-2]])
-    at = np.linspace(0, len(points) - 1, 3 * len(points) - 2)
-    k, t = np.minimum(at.astype(int), len(points) - 2), 0.0
-    t = (at - k)[:, None]
+    along = np.linspace(0, len(points) - 1, 3 * len(points) - 2)
+    k, t = np.minimum(along.astype(int), len(points) - 2), 0.0
+    t = (along - k)[:, None]
     a, b, c, d = (padded[k + i] for i in range(4))
     line = 0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3)
-    thick = np.interp(at, np.arange(len(points)), radii)
+    thick = np.interp(along, np.arange(len(points)), radii)
     rods = (_rod(p, line[i], line[i + 1], thick[i], thick[i + 1]) for i in range(len(line) - 1))
     return reduce(np.minimum, rods)
 

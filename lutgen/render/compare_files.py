@@ -74,9 +74,9 @@ def _linear(image: images.Image, path: Path) -> Picture:
 def _noise(part: exr.Part, rgb: np.ndarray, path: Path) -> tuple[np.ndarray | None, tuple[str, ...]]:
     """Covariance of a picture's pixels, and what has to be said about it."""
     if "render" in part.attributes:
-        made = rendered.read(path)
+        render = rendered.read(path)
         guessed = (f"{path.name}: of one sample, so its noise is a guess",)
-        return made.covariance(), () if made.estimates > 1 else guessed
+        return render.covariance(), () if render.estimates > 1 else guessed
     names = [f"sigma.{name}" for name in "RGB"]
     if not set(names) <= set(part.channels):
         return None, ()
@@ -102,12 +102,12 @@ def mask(a: Picture, b: Picture) -> tuple[np.ndarray, tuple[str, ...]]:
     is left.
     """
     if a.acescg.shape != b.acescg.shape:
-        sizes = [f"{one.name} is {one.acescg.shape[1]} x {one.acescg.shape[0]}" for one in (a, b)]
+        sizes = [f"{picture.name} is {picture.acescg.shape[1]} x {picture.acescg.shape[0]}" for picture in (a, b)]
         raise InputError(f"{sizes[0]}, {sizes[1]}: pictures of one size are needed; render one of them anew")
-    masks = [one.skin >= COVERED for one in (a, b) if one.skin is not None]
+    masks = [picture.skin >= COVERED for picture in (a, b) if picture.skin is not None]
     notes = ()
     if not masks:
-        masks = [np.any(one.acescg != 0, axis=-1) for one in (a, b)]
+        masks = [np.any(picture.acescg != 0, axis=-1) for picture in (a, b)]
         notes = ("no mask in either: every pixel that is not black counts",)
     both = np.logical_and.reduce(masks)
     if not both.any():

@@ -98,7 +98,7 @@ def changed(look: Look, values: Mapping) -> Look:
     0.05
     """
     names = {f.name: f.type for f in fields(Look)}
-    given = {}
+    changes = {}
     for name, value in values.items():
         if name not in names:
             raise InputError(f"{name}: a look has no such value; it has {', '.join(names)}")
@@ -109,8 +109,8 @@ def changed(look: Look, values: Mapping) -> Look:
                 raise InputError(f"{name} = {value!r}: a number is needed") from error
         elif isinstance(value, str) and name == "target_mm":
             value = [float(part) for part in value.split(",")] if _numeric(value) else value
-        given[name] = value
-    return replace(look, **given)
+        changes[name] = value
+    return replace(look, **changes)
 
 
 def _numeric(text: str) -> bool:

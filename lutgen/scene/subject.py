@@ -44,17 +44,17 @@ def model(name: str | None, mm_per_unit: float | None, folder: str | None, flip_
     camera looks at it.
     """
     shape = builtin.builtin() if name is None else mesh.of(name, mm_per_unit, flip_v)
-    found = Maps(**paint.paint(shape))
+    maps = Maps(**paint.paint(shape))
     if "albedo" in shape.textures:
-        found = replace(found, chromophores=None, albedo=color.decode_srgb(shape.textures["albedo"] / 255.0))
+        maps = replace(maps, chromophores=None, albedo=color.decode_srgb(shape.textures["albedo"] / 255.0))
     if "normal" in shape.textures:
-        found = replace(found, normal=shape.textures["normal"])
+        maps = replace(maps, normal=shape.textures["normal"])
     if folder == NO_MAPS:
-        found = Maps()
+        maps = Maps()
     elif folder is not None:
-        found = texture_maps.load(Path(folder), found)
+        maps = texture_maps.load(Path(folder), maps)
     centered = (shape.positions_mm - paint.origin_mm(shape)).astype("f4")
-    return replace(shape, positions_mm=centered, notes=(*shape.notes, *paint.notes(shape))), found
+    return replace(shape, positions_mm=centered, notes=(*shape.notes, *paint.notes(shape))), maps
 
 
 def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
@@ -70,32 +70,32 @@ def detail(albedo: np.ndarray, coverage: float = 1e-3) -> np.ndarray:
     return np.clip(acescg / np.median(acescg[painted], axis=0), 0.05, 8)
 
 
-def inverted(luts: LutSet, given: Maps, eumelanin: float) -> tuple[Maps, tuple[str, ...]]:
+def inverted(luts: LutSet, maps: Maps, eumelanin: float) -> tuple[Maps, tuple[str, ...]]:
     """Maps whose albedo is taken apart into pigment and blood instead of being laid over the skin; and what was found.
 
     `eumelanin` is the look's, for ratios found with one pigment tint another. Chromophore maps that were given stay.
     """
-    if given.albedo is None:
-        return given, ("no albedo to invert: neither the mesh nor the maps bring one",)
-    found = albedo_to_skin.invert(luts, _shrunk(given.albedo, 2048), eumelanin)
-    layers = albedo_to_skin.ratios(found)
-    if given.chromophores is not None:
-        kept = np.any(given.chromophores != 1, axis=(0, 1))
+    if maps.albedo is None:
+        return maps, ("no albedo to invert: neither the mesh nor the maps bring one",)
+    inversion = albedo_to_skin.invert(luts, _shrunk(maps.albedo, 2048), eumelanin)
+    layers = albedo_to_skin.ratios(inversion)
+    if maps.chromophores is not None:
+        painted = np.any(maps.chromophores != 1, axis=(0, 1))
         rows, columns = layers.shape[:2]
         layers = np.stack(
             [
-                texture_maps.resized(given.chromophores[..., k], rows, columns) if kept[k] else layers[..., k]
+                texture_maps.resized(maps.chromophores[..., k], rows, columns) if painted[k] else layers[..., k]
                 for k in range(3)
             ],
             axis=-1,
         )
-    skin, gain = found.skin, " ".join(f"{v:.2f}" for v in found.gain)
-    left = float(np.median(found.residual[found.painted]))
+    skin, gain = inversion.skin, " ".join(f"{v:.2f}" for v in inversion.gain)
+    left = float(np.median(inversion.residual[inversion.painted]))
     note = (
         f"albedo inverted: median melanin {skin[0]:.3g}, eumelanin {skin[1]:.2g}, hemoglobin {skin[2]:.3g}; "
         f"balanced by {gain}; median color difference left {left:.1f}"
     )
-    return replace(given, chromophores=layers, albedo=None, full_contrast_melanin=skin[0]), (note,)
+    return replace(maps, chromophores=layers, albedo=None, full_contrast_melanin=skin[0]), (note,)
 
 
 def surroundings_of(name: str, normalized: bool = False) -> np.ndarray | None:
@@ -112,12 +112,12 @@ def surroundings_of(name: str, normalized: bool = False) -> np.ndarray | None:
     return radiance * (light.studio_mean() / mean) if normalized and mean > 0 else radiance
 
 
-def textures_of(given: Maps) -> dict[str, np.ndarray]:
+def textures_of(maps: Maps) -> dict[str, np.ndarray]:
     """The maps as the passes take them, four channels where they filter them together."""
-    found = {"normal": given.normal, "chromophores": given.chromophores, "surface": given.surface}
-    if given.albedo is not None:
-        found["detail"] = detail(given.albedo)
-    return {name: _shrunk(values) for name, values in found.items() if values is not None}
+    textures = {"normal": maps.normal, "chromophores": maps.chromophores, "surface": maps.surface}
+    if maps.albedo is not None:
+        textures["detail"] = detail(maps.albedo)
+    return {name: _shrunk(values) for name, values in textures.items() if values is not None}
 
 
 def _shrunk(values: np.ndarray, most: int = 4096) -> np.ndarray:

@@ -33,14 +33,14 @@ def foreign(path, values: np.ndarray, **attributes) -> None:
 def test_every_one_of_16_bits_is_read(tmp_path, channels, name, attributes):
     values = texels(channels)
     foreign(tmp_path / name, values, **attributes)
-    found = images.read(tmp_path / name, "map")
-    assert found.bits == 16
-    assert np.array_equal(np.rint(found.values * 65535), values[..., :3])
+    image = images.read(tmp_path / name, "map")
+    assert image.bits == 16
+    assert np.array_equal(np.rint(image.values * 65535), values[..., :3])
     if channels == 4:
-        assert found.alpha is not None
-        assert np.array_equal(np.rint(found.alpha * 65535), values[..., 3])
+        assert image.alpha is not None
+        assert np.array_equal(np.rint(image.alpha * 65535), values[..., 3])
     else:
-        assert found.alpha is None
+        assert image.alpha is None
 
 
 def test_channels_one_after_the_other_are_refused(tmp_path):
@@ -52,15 +52,15 @@ def test_channels_one_after_the_other_are_refused(tmp_path):
 @pytest.mark.parametrize("channels", [1, 3, 4])
 def test_16_bits_are_written(tmp_path, channels):
     values = texels(channels)
-    given = values / np.float32(65535)
-    images.write_16_bit(tmp_path / "a.png", given[..., 0] if channels == 1 else given)
+    shares = values / np.float32(65535)
+    images.write_16_bit(tmp_path / "a.png", shares[..., 0] if channels == 1 else shares)
     hints = OpenImageIO.ImageSpec()
     hints["oiio:UnassociatedAlpha"] = 1
-    found = OpenImageIO.ImageInput.open(str(tmp_path / "a.png"), hints)
-    assert found is not None
-    assert found.spec().format == "uint16"
-    assert np.asarray(found.read_image("uint16")).tolist() == values.tolist()
-    found.close()
+    file = OpenImageIO.ImageInput.open(str(tmp_path / "a.png"), hints)
+    assert file is not None
+    assert file.spec().format == "uint16"
+    assert np.asarray(file.read_image("uint16")).tolist() == values.tolist()
+    file.close()
     images.write_16_bit(tmp_path / "b.png", np.array([[-1.0, 2.0]]))
     assert images.read(tmp_path / "b.png", "map").values.ravel().tolist() == [0, 1]
 
@@ -76,30 +76,30 @@ def test_alpha_is_read(tmp_path, mode):
         palette.save(tmp_path / "a.png", transparency=0)
     else:
         image.convert(mode).save(tmp_path / "a.png")
-    found = images.read(tmp_path / "a.png", "map")
-    assert found.alpha is not None
-    assert found.alpha[2, 1] == 0
-    assert (found.alpha > 0).sum() == 11
-    assert found.values.shape == (3, 4, 1 if mode == "LA" else 3)
+    read = images.read(tmp_path / "a.png", "map")
+    assert read.alpha is not None
+    assert read.alpha[2, 1] == 0
+    assert (read.alpha > 0).sum() == 11
+    assert read.values.shape == (3, 4, 1 if mode == "LA" else 3)
 
 
 def test_alpha_of_exr_is_read(tmp_path):
     color, alpha = np.full((2, 3, 3), 0.5, "f4"), np.eye(2, 3, dtype="f4")
     exr.write(tmp_path / "a.exr", [exr.Part("a", exr.rgb(color) | {"A": alpha}, {})])
-    found = images.read(tmp_path / "a.exr", "map")
-    assert found.bits == 32
-    assert np.array_equal(found.values, color)
-    assert found.alpha is not None
-    assert np.array_equal(found.alpha, alpha)
+    image = images.read(tmp_path / "a.exr", "map")
+    assert image.bits == 32
+    assert np.array_equal(image.values, color)
+    assert image.alpha is not None
+    assert np.array_equal(image.alpha, alpha)
 
 
 def test_a_layer_of_exr_is_a_color(tmp_path):
     texels = np.random.default_rng(0).random((2, 3, 3)).astype("f4")
     channels = {f"albedo.{name}": texels[..., i].copy() for i, name in enumerate("RGB")} | {"Z": texels[..., 0].copy()}
     exr.write(tmp_path / "a.exr", [exr.Part("a", channels, {})], exr.REC709)
-    found = images.read(tmp_path / "a.exr", "map")
-    assert np.array_equal(found.values, texels)
-    assert found.chromaticities == pytest.approx(exr.REC709)
+    image = images.read(tmp_path / "a.exr", "map")
+    assert np.array_equal(image.values, texels)
+    assert image.chromaticities == pytest.approx(exr.REC709)
 
 
 def test_plain_channels_come_before_layers_and_the_first_part_before_others(tmp_path):

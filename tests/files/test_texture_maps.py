@@ -25,8 +25,8 @@ def test_pictures_of_every_kind_are_read_bottom_row_first(tmp_path, size, mode):
     image = Image.fromarray((gray.astype("u2") * 257) if mode == "I;16" else gray)
     image = image if mode == "I;16" else image.convert(mode)
     image.save(tmp_path / "melanin.png")
-    values, given = texture_maps.read(tmp_path / "melanin.png")
-    assert not given
+    values, as_values = texture_maps.read(tmp_path / "melanin.png")
+    assert not as_values
     assert values.shape[:2] == size[::-1]
     assert values[-1].min() == 1
     assert size[1] == 1 or values[0].max() == 0
@@ -38,15 +38,15 @@ def test_a_folder_becomes_textures(tmp_path):
     Image.fromarray(np.full((3, 3), 128, "u1")).save(tmp_path / "roughness.png")
     exr.write(tmp_path / "thickness.exr", [exr.Part("map", {"Y": np.full((2, 2), 8.0, "f4")}, {})])
     Image.new("RGB", (5, 5), (255, 188, 0)).save(tmp_path / "albedo.png")
-    found = texture_maps.load(tmp_path)
-    assert found.normal is None
-    assert found.chromophores is not None
-    assert found.chromophores.shape == (8, 4, 3)
-    assert found.chromophores[0, 0] == pytest.approx([2, 1, 3], rel=0.02)
-    assert found.surface is not None
-    assert found.surface[0, 0] == pytest.approx([256 / 255, 1, 1, 8 / 32], abs=1e-3)
-    assert found.albedo is not None
-    assert found.albedo[0, 0] == pytest.approx([1, 0.503, 0], abs=1e-3)
+    maps = texture_maps.load(tmp_path)
+    assert maps.normal is None
+    assert maps.chromophores is not None
+    assert maps.chromophores.shape == (8, 4, 3)
+    assert maps.chromophores[0, 0] == pytest.approx([2, 1, 3], rel=0.02)
+    assert maps.surface is not None
+    assert maps.surface[0, 0] == pytest.approx([256 / 255, 1, 1, 8 / 32], abs=1e-3)
+    assert maps.albedo is not None
+    assert maps.albedo[0, 0] == pytest.approx([1, 0.503, 0], abs=1e-3)
 
 
 def test_each_map_replaces_one_and_leaves_the_others(tmp_path):
@@ -54,21 +54,21 @@ def test_each_map_replaces_one_and_leaves_the_others(tmp_path):
     surface = np.broadcast_to(np.array([0.9, 1.1, 0.7, 0.25]), (4, 4, 4))
     under = texture_maps.Maps(chromophores, surface, np.full((4, 4, 3), 128, "u1"))
     Image.fromarray(np.full((8, 2), 51, "u1")).save(tmp_path / "occlusion.png")
-    found = texture_maps.load(tmp_path, under)
-    assert found.surface is not None
-    assert found.surface.shape == (8, 4, 4)
-    assert found.surface[3, 2] == pytest.approx([0.9, 1.1, 0.2, 0.25])
-    assert found.chromophores is not None
-    assert np.array_equal(found.chromophores, chromophores)
-    assert found.normal is under.normal
+    maps = texture_maps.load(tmp_path, under)
+    assert maps.surface is not None
+    assert maps.surface.shape == (8, 4, 4)
+    assert maps.surface[3, 2] == pytest.approx([0.9, 1.1, 0.2, 0.25])
+    assert maps.chromophores is not None
+    assert np.array_equal(maps.chromophores, chromophores)
+    assert maps.normal is under.normal
     Image.fromarray(texture_maps.encode_ratio(np.full((4, 4), 3.0))).save(tmp_path / "melanin.png")
-    found = texture_maps.load(tmp_path, under)
-    assert found.chromophores is not None
-    assert found.chromophores[0, 0] == pytest.approx([3, 1, 2], rel=0.02)
+    maps = texture_maps.load(tmp_path, under)
+    assert maps.chromophores is not None
+    assert maps.chromophores[0, 0] == pytest.approx([3, 1, 2], rel=0.02)
     Image.new("RGB", (4, 4), (200, 150, 120)).save(tmp_path / "albedo.png")
-    found = texture_maps.load(tmp_path, under)
-    assert found.chromophores is not None
-    assert found.chromophores[0, 0] == pytest.approx([3, 1, 1], rel=0.02)  # what was generated lies in the albedo
+    maps = texture_maps.load(tmp_path, under)
+    assert maps.chromophores is not None
+    assert maps.chromophores[0, 0] == pytest.approx([3, 1, 1], rel=0.02)  # what was generated lies in the albedo
     (tmp_path / "melanin.png").unlink()
     assert texture_maps.load(tmp_path, under).chromophores is None
 
@@ -103,13 +103,13 @@ def test_float_pictures_hold_values(tmp_path):
     Image.fromarray(np.full((3, 5), 12.8, "f4")).save(tmp_path / "thickness.tif")
     Image.fromarray(np.full((3, 5), 2.5, "f4")).save(tmp_path / "hemoglobin.tiff")
     exr.write(tmp_path / "normal.exr", [exr.Part("map", exr.rgb(np.full((1, 7, 3), 0.5, "f4")), {})])
-    found = texture_maps.load(tmp_path)
-    assert found.surface is not None
-    assert found.surface[0, 0, 3] == pytest.approx(0.4)
-    assert found.chromophores is not None
-    assert found.chromophores[2, 4, 2] == pytest.approx(2.5)
-    assert found.normal is not None
-    assert found.normal.shape == (1, 7, 3)
+    maps = texture_maps.load(tmp_path)
+    assert maps.surface is not None
+    assert maps.surface[0, 0, 3] == pytest.approx(0.4)
+    assert maps.chromophores is not None
+    assert maps.chromophores[2, 4, 2] == pytest.approx(2.5)
+    assert maps.normal is not None
+    assert maps.normal.shape == (1, 7, 3)
 
 
 def test_resizing_keeps_even_values_and_order():

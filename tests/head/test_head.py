@@ -57,14 +57,14 @@ def test_texture_coordinates_lie_in_the_texture_and_do_not_wrap(shape):
 
 def test_no_triangle_lies_upside_down_in_the_texture(shape):
     """Else the front of an ear and its back would share texels; what is left is around the pole at the crown."""
-    made, _ = shape
-    a, b, c = (made.uv[made.triangles[:, k]].astype(float) for k in range(3))
+    head, _ = shape
+    a, b, c = (head.uv[head.triangles[:, k]].astype(float) for k in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    below = made.positions_mm[made.triangles].mean(axis=1)[:, 1] < 90
+    below = head.positions_mm[head.triangles].mean(axis=1)[:, 1] < 90
     assert (area[below] <= 0).mean() < 0.001
-    around = np.arctan2(made.positions_mm[:, 0], made.positions_mm[:, 2] + 20)
-    plain = np.stack([around / 7, made.positions_mm[:, 1] / 340], axis=1)
-    assert np.array_equal(builtin.unfolded(plain, made.triangles[:0], np.ones(len(plain), bool)), plain)
+    around = np.arctan2(head.positions_mm[:, 0], head.positions_mm[:, 2] + 20)
+    plain = np.stack([around / 7, head.positions_mm[:, 1] / 340], axis=1)
+    assert np.array_equal(builtin.unfolded(plain, head.triangles[:0], np.ones(len(plain), bool)), plain)
 
 
 # Means and standard deviations of men and women, mm (Gordon et al. 2014, ANSUR II; nose and mouth: Farkas 1994).
@@ -93,9 +93,9 @@ def measures(v: np.ndarray) -> dict[str, float]:
 
 
 def test_proportions_are_those_of_people(shape):
-    found = measures(shape[0].positions_mm.astype(float))
-    off = {name: (found[name] - mean) / sd for name, (mean, sd) in PUBLISHED.items()}
-    assert all(abs(z) <= 2 for z in off.values()), (found, off)
+    measured = measures(shape[0].positions_mm.astype(float))
+    off = {name: (measured[name] - mean) / sd for name, (mean, sd) in PUBLISHED.items()}
+    assert all(abs(z) <= 2 for z in off.values()), (measured, off)
 
 
 def texel(shape: mesh.Mesh, near) -> tuple[int, int]:
@@ -107,29 +107,29 @@ def texel(shape: mesh.Mesh, near) -> tuple[int, int]:
 
 
 def test_maps_know_lips_ears_and_lids(shape):
-    made, maps = shape
+    head, maps = shape
     melanin, eumelanin, hemoglobin = np.moveaxis(maps["chromophores"], -1, 0)
-    forehead = hemoglobin[texel(made, (0, 60, 80))]
-    assert hemoglobin[texel(made, (0, -71, 92))] > 1.8 * forehead
-    assert hemoglobin[texel(made, (78, -7, -25))] > 1.2 * forehead
+    forehead = hemoglobin[texel(head, (0, 60, 80))]
+    assert hemoglobin[texel(head, (0, -71, 92))] > 1.8 * forehead
+    assert hemoglobin[texel(head, (78, -7, -25))] > 1.2 * forehead
     assert np.all(eumelanin == 1)
     assert 0.3 < melanin.min() < 1 < melanin.max()
     surface = maps["surface"]
     assert np.all(np.isfinite(surface))
-    assert surface[texel(made, (0, 60, 80))][2] > 0.9  # open sky over the forehead
-    assert surface[texel(made, (0, -115, 20))][2] < 0.8  # less under the chin
-    rim = [surface[texel(made, (80, y, -30))][3] * 32 for y in (-10, 0, 10, 20)]
-    assert min(rim) < 9 < 25 < surface[texel(made, (0, 60, 80))][3] * 32
+    assert surface[texel(head, (0, 60, 80))][2] > 0.9  # open sky over the forehead
+    assert surface[texel(head, (0, -115, 20))][2] < 0.8  # less under the chin
+    rim = [surface[texel(head, (80, y, -30))][3] * 32 for y in (-10, 0, 10, 20)]
+    assert min(rim) < 9 < 25 < surface[texel(head, (0, 60, 80))][3] * 32
 
 
 def test_no_seam_shows(shape):
     """What is painted by place is alike on both sides of the seam."""
-    made, maps = shape
-    _, place, count = np.unique(np.round(made.positions_mm, 4), axis=0, return_inverse=True, return_counts=True)
+    head, maps = shape
+    _, place, count = np.unique(np.round(head.positions_mm, 4), axis=0, return_inverse=True, return_counts=True)
     doubled = np.flatnonzero(count[place.ravel()] > 1)
     assert len(doubled) > 50
-    at = np.clip((made.uv[doubled] * paint.MAP_SIZE).astype(int), 0, paint.MAP_SIZE - 1)
-    values = maps["chromophores"][at[:, 1], at[:, 0]]
+    texels = np.clip((head.uv[doubled] * paint.MAP_SIZE).astype(int), 0, paint.MAP_SIZE - 1)
+    values = maps["chromophores"][texels[:, 1], texels[:, 0]]
     for k in np.unique(place.ravel()[doubled]):
         pair = values[place.ravel()[doubled] == k]
         assert np.abs(pair[0] - pair[1]).max() < 0.2

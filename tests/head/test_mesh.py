@@ -13,12 +13,12 @@ from lutgen.head import mesh
 
 def ball(scale: float, uv: bool = True) -> trimesh.Trimesh:
     """A ball about as high as a head, `scale` units per millimetre."""
-    made = trimesh.creation.uv_sphere(radius=120 * scale, count=[16, 16])
+    sphere = trimesh.creation.uv_sphere(radius=120 * scale, count=[16, 16])
     if uv:
         picture = material.PBRMaterial(baseColorTexture=_red_above())
-        heights = (made.vertices[:, 2] / scale + 120) / 240
-        made.visual = texture.TextureVisuals(np.stack([heights * 0 + 0.5, heights], axis=1), picture)
-    return made
+        heights = (sphere.vertices[:, 2] / scale + 120) / 240
+        sphere.visual = texture.TextureVisuals(np.stack([heights * 0 + 0.5, heights], axis=1), picture)
+    return sphere
 
 
 def _red_above():
@@ -33,44 +33,44 @@ def _red_above():
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "mm"), (0.1, "cm"), (0.001, "m")])
 def test_units_are_guessed_and_said(tmp_path, suffix, scale, unit):
     ball(scale, uv=False).export(tmp_path / f"head.{suffix}")
-    found = mesh.load(tmp_path / f"head.{suffix}")
-    assert np.ptp(found.positions_mm, axis=0) == pytest.approx([240, 240, 240], rel=0.02)
-    assert f"1 unit is 1 {unit}" in found.notes[0]
-    assert "no texture coordinates" in found.notes[1]
-    assert found.uv is None
-    given = mesh.load(tmp_path / f"head.{suffix}", mm_per_unit=2.0)
-    assert np.ptp(given.positions_mm[:, 0]) == pytest.approx(480 * scale, rel=0.02)
-    assert not any("guessed" in note for note in given.notes)
+    guessed = mesh.load(tmp_path / f"head.{suffix}")
+    assert np.ptp(guessed.positions_mm, axis=0) == pytest.approx([240, 240, 240], rel=0.02)
+    assert f"1 unit is 1 {unit}" in guessed.notes[0]
+    assert "no texture coordinates" in guessed.notes[1]
+    assert guessed.uv is None
+    said = mesh.load(tmp_path / f"head.{suffix}", mm_per_unit=2.0)
+    assert np.ptp(said.positions_mm[:, 0]) == pytest.approx(480 * scale, rel=0.02)
+    assert not any("guessed" in note for note in said.notes)
 
 
 def test_texture_coordinates_run_up_and_pictures_lie_bottom_row_first(tmp_path):
     ball(1.0).export(tmp_path / "head.glb")
-    found = mesh.load(tmp_path / "head.glb")
-    assert found.uv is not None
-    top = found.positions_mm[:, 2].argmax()
-    assert found.uv[top, 1] == pytest.approx(1, abs=1e-3)
-    picture = found.textures["albedo"]
+    head = mesh.load(tmp_path / "head.glb")
+    assert head.uv is not None
+    top = head.positions_mm[:, 2].argmax()
+    assert head.uv[top, 1] == pytest.approx(1, abs=1e-3)
+    picture = head.textures["albedo"]
     assert picture[-1, 0].tolist() == [255, 0, 0]
     assert picture[0, 0].tolist() == [0, 0, 0]
 
 
 def test_parts_are_merged(tmp_path):
-    one, two = ball(1.0, uv=False), ball(1.0, uv=False)
-    two.apply_translation([300, 0, 0])
-    trimesh.Scene([one, two]).export(tmp_path / "two.glb")
-    found = mesh.load(tmp_path / "two.glb", mm_per_unit=1.0)
-    assert len(found.triangles) == 2 * len(one.faces)
-    assert np.ptp(found.positions_mm[:, 0]) == pytest.approx(540, rel=0.02)
+    left, right = ball(1.0, uv=False), ball(1.0, uv=False)
+    right.apply_translation([300, 0, 0])
+    trimesh.Scene([left, right]).export(tmp_path / "two.glb")
+    merged = mesh.load(tmp_path / "two.glb", mm_per_unit=1.0)
+    assert len(merged.triangles) == 2 * len(left.faces)
+    assert np.ptp(merged.positions_mm[:, 0]) == pytest.approx(540, rel=0.02)
 
 
 def test_normals_are_unit_outward_and_shared_where_corners_meet(tmp_path):
     ball(1.0).export(tmp_path / "head.glb")
-    found = mesh.load(tmp_path / "head.glb", mm_per_unit=1.0)
-    outward = (found.normals * found.positions_mm).sum(axis=1) / np.linalg.norm(found.positions_mm, axis=1)
+    head = mesh.load(tmp_path / "head.glb", mm_per_unit=1.0)
+    outward = (head.normals * head.positions_mm).sum(axis=1) / np.linalg.norm(head.positions_mm, axis=1)
     assert outward.min() > 0.97
-    assert np.linalg.norm(found.normals, axis=1) == pytest.approx(np.ones(len(found.normals)), abs=1e-5)
-    doubled = np.concatenate([found.positions_mm, found.positions_mm])
-    again = mesh.normals(doubled.astype(float), np.concatenate([found.triangles, found.triangles + len(doubled) // 2]))
+    assert np.linalg.norm(head.normals, axis=1) == pytest.approx(np.ones(len(head.normals)), abs=1e-5)
+    doubled = np.concatenate([head.positions_mm, head.positions_mm])
+    again = mesh.normals(doubled.astype(float), np.concatenate([head.triangles, head.triangles + len(doubled) // 2]))
     assert np.array_equal(again[: len(doubled) // 2], again[len(doubled) // 2 :])
 
 
@@ -96,25 +96,25 @@ def test_what_is_no_mesh_is_one_line(tmp_path):
 
 
 def test_texture_coordinates_that_are_nan_are_said_and_left(tmp_path):
-    made = ball(1.0, uv=False)
-    lines = [f"v {x} {y} {z}\nvt nan nan" for x, y, z in made.vertices]
-    lines += ["f " + " ".join(f"{k + 1}/{k + 1}" for k in face) for face in made.faces]
+    sphere = ball(1.0, uv=False)
+    lines = [f"v {x} {y} {z}\nvt nan nan" for x, y, z in sphere.vertices]
+    lines += ["f " + " ".join(f"{k + 1}/{k + 1}" for k in face) for face in sphere.faces]
     (tmp_path / "head.obj").write_text("\n".join(lines))
-    found = mesh.load(tmp_path / "head.obj", 1.0)
-    assert found.uv is None
-    assert "has texture coordinates that are NaN: maps, freckles" in found.notes[0]
+    head = mesh.load(tmp_path / "head.obj", 1.0)
+    assert head.uv is None
+    assert "has texture coordinates that are NaN: maps, freckles" in head.notes[0]
 
 
 def test_v_can_be_turned_over(tmp_path):
     ball(1.0).export(tmp_path / "head.glb")
-    one, two = (mesh.load(tmp_path / "head.glb", 1.0, flip_v=flip) for flip in (False, True))
-    assert one.uv is not None
-    assert two.uv is not None
-    assert two.uv[:, 1] == pytest.approx(1 - one.uv[:, 1])
-    assert np.array_equal(two.uv[:, 0], one.uv[:, 0])
+    up, down = (mesh.load(tmp_path / "head.glb", 1.0, flip_v=flip) for flip in (False, True))
+    assert up.uv is not None
+    assert down.uv is not None
+    assert down.uv[:, 1] == pytest.approx(1 - up.uv[:, 1])
+    assert np.array_equal(down.uv[:, 0], up.uv[:, 0])
     again = mesh.of(str(tmp_path / "head.glb"), 1.0, flip_v=True).uv
     assert again is not None
-    assert np.array_equal(again, two.uv)
+    assert np.array_equal(again, down.uv)
 
 
 def test_a_file_that_is_a_known_scan_is_read_as_one(tmp_path, monkeypatch):
@@ -129,14 +129,14 @@ def test_a_file_that_is_a_known_scan_is_read_as_one(tmp_path, monkeypatch):
     }  # fmt: skip
     plain = mesh.load(tmp_path / "some.glb", 1.0)
     monkeypatch.setattr(mesh, "SCANS", {"somebody": known})
-    found = mesh.of(str(tmp_path / "some.glb"))
-    assert found.attribution == "Somebody, CC-BY"
-    assert found.positions_mm == pytest.approx(2 * plain.positions_mm, rel=1e-5)
+    scan = mesh.of(str(tmp_path / "some.glb"))
+    assert scan.attribution == "Somebody, CC-BY"
+    assert scan.positions_mm == pytest.approx(2 * plain.positions_mm, rel=1e-5)
     assert plain.uv is not None
-    assert found.uv is not None
-    assert found.uv[:, 1] == pytest.approx(1 - plain.uv[:, 1])
-    assert list(found.textures) == ["albedo"]
-    assert "normal map does not lie beside it (normal_tangent.jpg or N.jpg)" in found.notes[0]
+    assert scan.uv is not None
+    assert scan.uv[:, 1] == pytest.approx(1 - plain.uv[:, 1])
+    assert list(scan.textures) == ["albedo"]
+    assert "normal map does not lie beside it (normal_tangent.jpg or N.jpg)" in scan.notes[0]
     assert mesh.of(str(tmp_path / "some.glb"), 3.0).positions_mm == pytest.approx(3 * plain.positions_mm, rel=1e-5)
     (tmp_path / "albedo.jpg").write_bytes(b"another picture")
     assert mesh.of(str(tmp_path / "some.glb")).textures == {}

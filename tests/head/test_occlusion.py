@@ -75,8 +75,8 @@ def test_sheets_with_holes_and_loose_triangles_are_no_obstacle():
     _, seen, thick = around(torn)
     assert np.all(np.isfinite(seen) & np.isfinite(thick))
     assert np.quantile(seen, 0.05) > 0.9
-    one = trimesh.Trimesh([[0, 0, 0], [9, 0, 0], [0, 9, 0.0]], [[0, 1, 2], [0, 0, 1]], process=False)
-    _, seen, thick = around(one)
+    loose = trimesh.Trimesh([[0, 0, 0], [9, 0, 0], [0, 9, 0.0]], [[0, 1, 2], [0, 0, 1]], process=False)
+    _, seen, thick = around(loose)
     assert seen == pytest.approx(np.ones(3), abs=0.05)
     assert np.all(thick == occlusion.THICKEST_MM)
 

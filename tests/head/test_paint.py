@@ -39,22 +39,22 @@ def both(tmp_path_factory):
 
 
 def test_a_head_moved_and_scaled_gets_its_own_paint_back(both):
-    (shape, own, _), (other, found, said) = both
+    (shape, own, _), (other, painted, said) = both
     assert said == ()
     face = (shape.positions_mm[:, 2] > 40) & (shape.positions_mm[:, 1] > -115)
     ears = (np.abs(shape.positions_mm[:, 0]) > 72) & (np.abs(shape.positions_mm[:, 1] + 7) < 40)
     for channel, where, least in ((0, face, 0.85), (2, face, 0.9), (2, ears, 0.75)):
-        a, b = at_vertices(shape, own["chromophores"])[where], at_vertices(other, found["chromophores"])[where]
+        a, b = at_vertices(shape, own["chromophores"])[where], at_vertices(other, painted["chromophores"])[where]
         assert np.corrcoef(a[:, channel], b[:, channel])[0, 1] > least, channel
     assert paint.origin_mm(shape).tolist() == [0, 0, 0]
     assert paint.origin_mm(other) == pytest.approx([17, -80, 33], abs=2)
-    lips = [at_vertices(s, maps["chromophores"])[:, 2] > 2.2 for s, maps in ((shape, own), (other, found))]
+    lips = [at_vertices(s, maps["chromophores"])[:, 2] > 2.2 for s, maps in ((shape, own), (other, painted))]
     assert (lips[0] & lips[1]).sum() > 0.85 * (lips[0] | lips[1]).sum() > 100
 
 
 def test_open_sky_is_the_same_and_thickness_grows_with_the_head(both):
-    (shape, own, _), (other, found, _) = both
-    a, b = at_vertices(shape, own["surface"]), at_vertices(other, found["surface"])
+    (shape, own, _), (other, painted, _) = both
+    a, b = at_vertices(shape, own["surface"]), at_vertices(other, painted["surface"])
     assert np.abs(a[:, 2] - b[:, 2]).mean() < 0.03
     thin = (a[:, 3] < 0.5) & (b[:, 3] < 0.6) & (np.abs(shape.positions_mm[:, 0]) > 75)
     assert thin.sum() > 200
@@ -110,7 +110,7 @@ def test_texture_coordinates_beyond_the_texture_wrap_around():
     values = np.linspace(0, 1, 4)[:, None]
     inside = mesh.Mesh(square, square, square[:, :2] * 0.5, triangles)
     beyond = replace(inside, uv=inside.uv + np.array([-3, 5], "f4"))
-    one, two = (paint._in_texture(s, values, 32) for s in (inside, beyond))
-    assert np.array_equal(one, two)
+    drawn, wrapped = (paint._in_texture(s, values, 32) for s in (inside, beyond))
+    assert np.array_equal(drawn, wrapped)
     across = paint._in_texture(replace(inside, uv=inside.uv + np.array([0.75, 0], "f4")), values, 32)
-    assert across[:16, :8] == pytest.approx(one[:16, 8:16], abs=1e-6)
+    assert across[:16, :8] == pytest.approx(drawn[:16, 8:16], abs=1e-6)

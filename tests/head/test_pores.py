@@ -74,11 +74,11 @@ def patch(x: tuple[float, float], y: tuple[float, float], z: float = 85.0, step:
 
 def test_freckles_are_round():
     """As far along one axis as along the other the dots resemble themselves."""
-    found = complexion._freckles(patch((0, 60), (-40, 20)), np.ones(())).astype(float)
-    assert 0.01 < (found > 0.1).mean() < 0.3
-    alike = [np.mean(found * np.roll(found, round(0.4 / 0.08), axis)) for axis in (0, 1)]
+    freckles = complexion._freckles(patch((0, 60), (-40, 20)), np.ones(())).astype(float)
+    assert 0.01 < (freckles > 0.1).mean() < 0.3
+    alike = [np.mean(freckles * np.roll(freckles, round(0.4 / 0.08), axis)) for axis in (0, 1)]
     assert alike[0] == pytest.approx(alike[1], rel=0.1)
-    assert alike[0] < 0.8 * np.mean(found**2)
+    assert alike[0] < 0.8 * np.mean(freckles**2)
 
 
 def test_hairs_grow_on_brows_and_lids_only_and_not_the_same_on_both_sides():

@@ -33,18 +33,18 @@ def write_hdr(path, picture: np.ndarray, runs: bool, fields: str = "FORMAT=32-bi
             continue
         body += bytes([2, 2, columns >> 8, columns & 255])
         for plane in row.T:
-            at = 0
-            while at < columns:
+            start = 0
+            while start < columns:
                 same = 1
-                while at + same < columns and same < 127 and plane[at + same] == plane[at]:
+                while start + same < columns and same < 127 and plane[start + same] == plane[start]:
                     same += 1
                 if same > 2:
-                    body += bytes([128 + same, plane[at]])
-                    at += same
+                    body += bytes([128 + same, plane[start]])
+                    start += same
                 else:
-                    count = min(columns - at, 5)
-                    body += bytes([count]) + plane[at : at + count].tobytes()
-                    at += count
+                    count = min(columns - start, 5)
+                    body += bytes([count]) + plane[start : start + count].tobytes()
+                    start += count
     path.write_bytes(f"#?RADIANCE\n# a test\n{fields}\n-Y {rows} +X {columns}\n".encode() + body)
 
 
@@ -64,19 +64,19 @@ def scene_of(rows: int = 16) -> np.ndarray:
 def test_a_radiance_picture_comes_back(tmp_path, runs):
     picture = scene_of()
     write_hdr(tmp_path / "a.hdr", picture, runs)
-    found = images.read(tmp_path / "a.hdr", "environment", radiance=True).values
-    assert np.abs(found / picture - 1).max() < 0.5 / 64  # half of a mantissa's last step, in the darkest channel
+    values = images.read(tmp_path / "a.hdr", "environment", radiance=True).values
+    assert np.abs(values / picture - 1).max() < 0.5 / 64  # half of a mantissa's last step, in the darkest channel
     write_hdr(tmp_path / "b.hdr", picture, runs, "EXPOSURE=2\nFORMAT=32-bit_rle_rgbe\nEXPOSURE= 4.0\n")
-    assert images.read(tmp_path / "b.hdr", "environment", radiance=True).values == pytest.approx(found / 8)
+    assert images.read(tmp_path / "b.hdr", "environment", radiance=True).values == pytest.approx(values / 8)
 
 
 def test_both_formats_give_the_same_light_in_acescg(tmp_path):
     picture = scene_of()
     write_hdr(tmp_path / "a.hdr", picture, True)
     write_exr(tmp_path / "a.exr", picture)
-    one, two = (environment.read(tmp_path / name) for name in ("a.hdr", "a.exr"))
-    assert np.abs(one / two - 1).max() < 0.01
-    assert environment.mean_radiance(one) == pytest.approx(environment.mean_radiance(two), rel=5e-3)
+    from_hdr, from_exr = (environment.read(tmp_path / name) for name in ("a.hdr", "a.exr"))
+    assert np.abs(from_hdr / from_exr - 1).max() < 0.01
+    assert environment.mean_radiance(from_hdr) == pytest.approx(environment.mean_radiance(from_exr), rel=5e-3)
     gray = np.full((4, 8, 3), 0.37)
     write_exr(tmp_path / "gray.exr", gray)
     assert environment.read(tmp_path / "gray.exr") == pytest.approx(gray, rel=1e-6)
@@ -108,9 +108,9 @@ def plain():
     """A square meter facing the camera, without maps."""
     corners = np.array([[-500, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]], "f4")
     square = Mesh(corners, np.tile(np.array([0, 0, 1], "f4"), (4, 1)), None, np.array([[0, 1, 2], [0, 2, 3]], "i4"))
-    made = app.open_stage(lutgen.load(), square, Maps(), (64, 64))
-    yield made
-    stages.release(made)
+    opened = app.open_stage(lutgen.load(), square, Maps(), (64, 64))
+    yield opened
+    stages.release(opened)
     gl.check()
 
 
@@ -168,9 +168,9 @@ def test_no_surroundings_are_dark_and_the_studio_comes_back(plain):
 
 def test_normalizing_makes_a_file_as_bright_as_the_studio(tmp_path):
     write_exr(tmp_path / "a.exr", 300 * scene_of())
-    made = subject.surroundings_of(str(tmp_path / "a.exr"), normalized=True)
-    assert made is not None
-    assert environment.mean_radiance(made) == pytest.approx(light.studio_mean())
+    radiance = subject.surroundings_of(str(tmp_path / "a.exr"), normalized=True)
+    assert radiance is not None
+    assert environment.mean_radiance(radiance) == pytest.approx(light.studio_mean())
 
 
 @pytest.mark.parametrize(

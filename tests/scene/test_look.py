@@ -68,8 +68,8 @@ def test_the_camera_looks_at_its_target_from_its_distance(azimuth, elevation):
 def test_a_millimetre_is_as_many_pixels_as_the_focal_length_says():
     look = Look()
     camera = looks.camera(look, 640, 360)
-    one, two = (camera.projection @ camera.view @ [*(x * camera.view[0, :3]), 1] for x in (0.0, 1.0))
-    pixels = (two[0] / two[3] - one[0] / one[3]) * 640 / 2
+    middle, aside = (camera.projection @ camera.view @ [*(x * camera.view[0, :3]), 1] for x in (0.0, 1.0))
+    pixels = (aside[0] / aside[3] - middle[0] / middle[3]) * 640 / 2
     assert pixels == pytest.approx(camera.focal_pixels / look.distance_mm, rel=1e-6)
 
 
