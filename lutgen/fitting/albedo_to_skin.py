@@ -1,7 +1,7 @@
 """Painted color to pigment: which melanin and hemoglobin a color LUT would need for each texel of an albedo.
 
-*Balance*: one gain per channel, for paint is seldom white-balanced (balance). *Solution*: the skin nearest to
-each texel's color (gamut). *Blotches*: dark skin hardly shows its blood, so noise would become blotches. The
+*Balance*: one gain per channel, for paint is seldom white-balanced (white_balance.py). *Solution*: the skin nearest to
+each texel's color (skin_colors.py). *Blotches*: dark skin hardly shows its blood, so noise would become blotches. The
 albedo's low frequencies are therefore solved first, and each texel is held to that solution as strongly as the color
 alone says little. What is left in the low frequencies is mostly baked light; ratio maps may keep only a share of it.
 
@@ -129,7 +129,7 @@ def ratios_of(luts: LutSet, eumelanin: float | None) -> list[float]:
 def ratios(
     inversion: Inversion, low_kept: tuple[float, float] = LOW_KEPT, most: tuple[float, float] = RATIO
 ) -> np.ndarray:
-    """Ratio maps [R, C, 3] of melanin, eumelanin (1) and hemoglobin as `lutgen.maps.Maps.chromophores` holds them.
+    """Ratio maps [R, C, 3] of melanin, eumelanin (1) and hemoglobin as `texture_maps.Maps.chromophores` holds them.
 
     Median 1 each, so that the sliders set the tone; background is 1.
     """

@@ -26,7 +26,7 @@ _NO_FACE_MM = np.array([0.0, 1000.0, -1000.0])
 def paint(shape: Mesh) -> dict[str, Any]:
     """A head's maps [2048, 2048, channels], first row lowest: `chromophores`, `surface`, `normal`.
 
-    As `lutgen.maps.Maps` holds them; kept in the cache. Without texture coordinates none are made.
+    As `texture_maps.Maps` holds them; kept in the cache. Without texture coordinates none are made.
     """
     maps = _painted(shape)
     return {name: maps[name] for name in ("chromophores", "surface", "normal") if name in maps}
