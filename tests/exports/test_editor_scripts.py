@@ -10,8 +10,10 @@ import re
 import runpy
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import tree_sitter
@@ -270,7 +272,7 @@ def documented() -> dict[str, dict[str, int | None]]:
     return types
 
 
-def nodes(node, *kinds: str):
+def nodes(node, *kinds: str) -> Iterator[Any]:
     """The node and all below it that are of these kinds, from top to bottom."""
     if node.type in kinds:
         yield node
@@ -318,7 +320,8 @@ def undocumented_in_unity(script: str) -> list[str]:
     for node in nodes(root, "invocation_expression", "member_access_expression"):
         count = None
         if node.type == "invocation_expression":
-            count, node = node.child_by_field_name("arguments").named_child_count, node.child_by_field_name("function")
+            arguments, node = node.child_by_field_name("arguments"), node.child_by_field_name("function")
+            count = arguments.named_child_count
         elif node.parent.type == "invocation_expression" and node.parent.child_by_field_name("function") == node:
             continue
         member, receiver = re.sub("<.*", "", text(node, "name") or text(node)), text(node, "expression")

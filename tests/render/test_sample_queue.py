@@ -98,6 +98,7 @@ def test_the_command_says_what_a_walk_inside_needs(tmp_path, capsys):
         "mesh",
         "--out",
         str(out),
+        "--quiet",
     ]
     assert main([*command, "--size", "16x16", "--spp", "8"]) == 2
     said = capsys.readouterr().err.strip()
