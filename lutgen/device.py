@@ -94,14 +94,14 @@ def _lanes(cl: ModuleType, device) -> int:
 def devices() -> tuple[Device, ...]:
     """Every OpenCL device, best first: GPUs, then PoCL, then other CPU runtimes; empty where there is none."""
     cl = _opencl()
-    found = []
+    opencl_devices = []
     with suppress(cl.Error):
         for platform in cl.get_platforms():
             with suppress(cl.Error):  # one broken driver must not hide the others
-                found += platform.get_devices()
+                opencl_devices += platform.get_devices()
     kinds = {cl.device_type.GPU: "gpu", cl.device_type.CPU: "cpu"}
     ranked = []
-    for device in found:
+    for device in opencl_devices:
         kind = next((name for flag, name in kinds.items() if device.type & flag), "other")
         rank = 0 if kind == "gpu" else 1 if "Portable" in device.platform.name else 2
         ranked.append((rank, len(ranked), device, kind))
@@ -116,8 +116,8 @@ def choose(name: str | int | None = None) -> Device:
 
     Raises MachineError where there is no OpenCL, InputError where nothing matches.
     """
-    given = "device" if name not in (None, "") else "LUTGEN_DEVICE"
-    wanted = str(name) if given == "device" else os.environ.get("LUTGEN_DEVICE", "")
+    source = "device" if name not in (None, "") else "LUTGEN_DEVICE"
+    wanted = str(name) if source == "device" else os.environ.get("LUTGEN_DEVICE", "")
     available = devices()
     if not available:
         raise MachineError(f"no OpenCL device; {INSTALL_HINT}")
@@ -127,7 +127,7 @@ def choose(name: str | int | None = None) -> Device:
         matches = [d for d in available if wanted.lower() in f"{d.platform} {d.name}".lower()]
     if not matches:
         listed = ", ".join(f"{i} ({d.platform}: {d.name})" for i, d in enumerate(available))
-        raise InputError(f"{given} = {wanted!r}: no device matches; allowed is an index or part of a name of {listed}")
+        raise InputError(f"{source} = {wanted!r}: no device matches; allowed is an index or part of a name of {listed}")
     return _open(matches[0])
 
 

@@ -93,12 +93,12 @@ def spectrum(wavelength_nm, reflectance, notes: tuple[str, ...] = (), where: str
         )
     wrong = ~((values >= 0) & (values <= 1))
     if wrong.any():
-        at, worst = nm[wrong][0], np.nanmax(values) if np.isfinite(values).any() else np.nan
+        wrong_nm, worst = nm[wrong][0], np.nanmax(values) if np.isfinite(values).any() else np.nan
         percent = np.all(values >= 0) and 2 < worst <= 100
         advice = "they look like percent: divide by 100" if percent else "mend or leave out such rows"
         raise InputError(
-            f"{where}reflectance = {values[wrong][0]:g} at {at:g} nm ({wrong.sum()} of {len(nm)} rows): allowed is "
-            f"0 to 1; {advice}"
+            f"{where}reflectance = {values[wrong][0]:g} at {wrong_nm:g} nm ({wrong.sum()} of {len(nm)} rows): allowed "
+            f"is 0 to 1; {advice}"
         )
     return Measured(values @ color_weights(nm), "spectrum", nm, values, notes)
 
@@ -184,8 +184,8 @@ def _from_csv(path: Path) -> Measured:
     names = [name.strip().lower() for name in header]
     for column in COLUMNS:
         if names.count(column) != 1:
-            found = "twice" if names.count(column) else "missing"
-            raise InputError(f"{path}: column {column} is {found}; the header is {shown(', '.join(header))}")
+            fault = "twice" if names.count(column) else "missing"
+            raise InputError(f"{path}: column {column} is {fault}; the header is {shown(', '.join(header))}")
     places = [names.index(column) for column in COLUMNS]
     values = []
     for (line, _), row in zip(kept[1:], rows, strict=False):

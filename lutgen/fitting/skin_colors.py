@@ -223,5 +223,5 @@ def _step(surface, wanted, weights, nodes, hold, pull, reach) -> np.ndarray:
     )
 
 
-def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+def _dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]

@@ -137,8 +137,8 @@ def _layer(layers: list[Layer], unsafe: bool) -> Layer:
         values = {getattr(layer, name) for layer in layers}
         if len(values) > 1:
             able = "multipole, adding-doubling or direct" if len(layers) == 2 else "adding-doubling or direct"
-            given = " and ".join(f"{value:g}" for value in sorted(values))
-            raise InputError(f"{name} = {given}: dipole takes layers that are all alike; use method {able}")
+            listed = " and ".join(f"{value:g}" for value in sorted(values))
+            raise InputError(f"{name} = {listed}: dipole takes layers that are all alike; use method {able}")
     require_albedo(bottom, least_albedo(bottom.n), "dipole", unsafe)
     return bottom
 

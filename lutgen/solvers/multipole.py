@@ -128,8 +128,8 @@ def _checked(layers: list[Layer], unsafe: bool) -> list[Layer]:
     dipole.require_flag(unsafe)
     method = "use method adding-doubling or direct"
     if len(layers) != 2:
-        one = "use method dipole" if len(layers) == 1 else method
-        raise InputError(f"layers: multipole takes 2 layers, not {len(layers)}; {one}")
+        advice = "use method dipole" if len(layers) == 1 else method
+        raise InputError(f"layers: multipole takes 2 layers, not {len(layers)}; {advice}")
     upper, lower = layers
     if not np.isinf(lower.thickness_mm) or not 0 < upper.thickness_mm < np.inf:
         raise InputError(

@@ -227,14 +227,14 @@ def choose(rows: dict[str, dict[str, Rows]], K: int) -> tuple[list[int], list[np
     """K lattice points and their XYZ weights [K, 3] per pipeline: the best of many exchanges, then reweighted."""
     equations = [normal_equations(part) for part in rows.values()]
     rng = np.random.default_rng(K)
-    found = []
+    optima = []
     for _ in range(STARTS[K]):
         # One start wavelength in each of K equal parts of 400 to 700 nm.
         nm = 400 + 300 / K * (np.arange(K) + rng.uniform(0, 1, K))
         start = np.unique(np.rint((nm - LATTICE_NM[0]) / 2).astype(int))
         if len(start) == K:
-            found.append(exchange(equations, start.tolist(), rng))
-    _, chosen = min(found)
+            optima.append(exchange(equations, start.tolist(), rng))
+    _, chosen = min(optima)
     for _ in range(REWEIGHTINGS):
         weights = [solve(part, chosen)[0] for part in equations]
         rows = {p: reweighted(part, chosen, w) for (p, part), w in zip(rows.items(), weights, strict=True)}
@@ -271,8 +271,8 @@ def lines(
 
 def energy_difference(xyz_1: np.ndarray, xyz_2: np.ndarray) -> np.ndarray:
     """EE difference [S] of two profiles [S, rings, 3], the largest of the ACEScg channels."""
-    one, other = (np.moveaxis(xyz @ color.ACESCG_FROM_XYZ.T, -1, 1) for xyz in (xyz_1, xyz_2))
-    return profiles.ee_difference(one, other, RADIUS_EDGES_MM).max(axis=-1)
+    rgb_1, rgb_2 = (np.moveaxis(xyz @ color.ACESCG_FROM_XYZ.T, -1, 1) for xyz in (xyz_1, xyz_2))
+    return profiles.ee_difference(rgb_1, rgb_2, RADIUS_EDGES_MM).max(axis=-1)
 
 
 def _worst(errors: np.ndarray) -> str:

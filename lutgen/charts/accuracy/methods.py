@@ -21,10 +21,10 @@ from lutgen.charts.stability.error_maps import mixed_layer
 from lutgen.skin import chromophores, tissue
 from lutgen.solvers import adding_doubling, dipole, direct, exact_totals, multipole, path_table, profiles
 from lutgen.tables import bake, expand
-from lutgen.tables import recipe as recipes
 from lutgen.tables import wavelengths as quadrature
+from lutgen.tables.recipe import Recipe
 
-RECIPE = recipes.Recipe()
+RECIPE = Recipe()
 GRID = RECIPE.color
 SKINS = 1000
 SKINS_PER_CELL = 40

@@ -20,10 +20,10 @@ from lutgen.planning import stored_paths
 from lutgen.solvers import exact_totals, profiles
 from lutgen.solvers.paths import PathTable
 from lutgen.tables import bake, expand
-from lutgen.tables import recipe as recipes
 from lutgen.tables.axes import Grid, default_grid
+from lutgen.tables.recipe import Recipe
 
-TISSUE = recipes.Recipe().skin
+TISSUE = Recipe().skin
 """The setting of every chart here: the default recipe's."""
 *RULES, REFERENCE = _ALL = ("6", "8", "12", "10nm", "5nm")
 TRACE_WAVELENGTHS, TRACE_SEEDS, PHOTONS = 10, (0, 1), {False: 2**20, True: 2**17}
@@ -81,7 +81,7 @@ def _absorbers(paths: PathTable) -> expand.Absorbers:
 
 
 def _skins(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return bake.random_skins(recipes.Recipe().color, count, SKINS_SEED)
+    return bake.random_skins(Recipe().color, count, SKINS_SEED)
 
 
 def _difference(rgb_1: np.ndarray, rgb_2: np.ndarray) -> np.ndarray:
