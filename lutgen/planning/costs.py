@@ -36,7 +36,7 @@ class Tier:
 def _file() -> tuple[dict[str, tuple[float, float]], dict[str, float], tuple[Tier, ...], str]:
     """Trace (fixed, per photon) by rule, the rest's coefficients, tiers from cheap to dear, and the header."""
     lines = (files("lutgen.planning") / "plan.csv").read_text(encoding="utf-8").splitlines()
-    trace, rest, found = {}, {}, {}
+    trace, rest, costs_of_tier = {}, {}, {}
     for line in lines:
         if line.startswith("#"):
             continue
@@ -46,8 +46,8 @@ def _file() -> tuple[dict[str, tuple[float, float]], dict[str, float], tuple[Tie
         elif kind == "rest":
             rest[name] = float(cells[0])
         else:
-            found.setdefault((name, int(cells[0])), []).append((float(cells[1]), float(cells[2])))
-    tiers = tuple(Tier(name, taps, tuple(values)) for (name, taps), values in found.items())
+            costs_of_tier.setdefault((name, int(cells[0])), []).append((float(cells[1]), float(cells[2])))
+    tiers = tuple(Tier(name, taps, tuple(values)) for (name, taps), values in costs_of_tier.items())
     return trace, rest, tiers, lines[0].removeprefix("# ")
 
 

@@ -52,10 +52,10 @@ class Judge:
 
     def share(self, recipe: Recipe) -> float:
         """What a recipe is likely to err by, over the tolerance: of color or profile, whichever is more."""
-        found = self.color(recipe) / self.needs.tolerance
-        if found > 2 or not self.with_profile:
-            return found
-        return max(found, self.profile(recipe).likely / self.needs.ee_tolerance)
+        color_share = self.color(recipe) / self.needs.tolerance
+        if color_share > 2 or not self.with_profile:
+            return color_share
+        return max(color_share, self.profile(recipe).likely / self.needs.ee_tolerance)
 
     def rungs(self, recipe: Recipe) -> dict[str, float]:
         """The share that each rung down is likely to take of the tolerance: above 1 for all of the least recipe."""

@@ -97,10 +97,10 @@ def costs(cores: int) -> Iterator[str]:
     ]).T  # fmt: skip
     rest = np.array([run["rest"] for run in seconds.values()])
     columns = {"start": color * 0 + 1, "color node": color, "profile node": profile, "ring of a node": profile * rings}
-    found, _ = nnls(np.stack([v / rest for v in columns.values()], axis=1), np.ones(len(rest)))
-    for column, value in zip(columns, found, strict=True):
+    coefficients, _ = nnls(np.stack([v / rest for v in columns.values()], axis=1), np.ones(len(rest)))
+    for column, value in zip(columns, coefficients, strict=True):
         yield f"rest,{column},{value:.4g}"
-    predicted = np.stack(list(columns.values()), axis=1) @ found
+    predicted = np.stack(list(columns.values()), axis=1) @ coefficients
     yield f"# off by {100 * np.abs(predicted / rest - 1).max():.0f} % at most over {len(rest)} bakes"
 
 

@@ -84,10 +84,10 @@ class Needs:
         return {f.name: list(v) if isinstance(v := getattr(self, f.name), tuple) else v for f in fields(self)}
 
 
-def _range(name: str, given: object) -> Range:
-    if not isinstance(given, tuple) or len(given) != 2:
-        raise InputError(f"{name} = {shown(given)}: a pair of low and high is needed")
-    low, high = (in_range(name, value, *ALLOWED_TONES[name]) for value in given)
+def _range(name: str, low_high: object) -> Range:
+    if not isinstance(low_high, tuple) or len(low_high) != 2:
+        raise InputError(f"{name} = {shown(low_high)}: a pair of low and high is needed")
+    low, high = (in_range(name, value, *ALLOWED_TONES[name]) for value in low_high)
     if low > high:
         raise InputError(f"{name} = {low:g}:{high:g}: low is above high; swap them")
     return low, high
@@ -182,15 +182,15 @@ def _map_ratios(path: Path) -> dict[str, Range]:
     """Least and greatest ratio of each chromophore in a map or a folder of maps."""
     if path.is_dir():
         files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in texture_maps.SUFFIXES]
-        found = {file.stem: file for file in files if file.stem in texture_maps.RATIOS}
+        file_of_ratio = {file.stem: file for file in files if file.stem in texture_maps.RATIOS}
     else:
-        found = {path.stem: path} if path.stem in texture_maps.RATIOS else {}
-    if not found:
+        file_of_ratio = {path.stem: path} if path.stem in texture_maps.RATIOS else {}
+    if not file_of_ratio:
         raise InputError(
             f"tones = {path}: no map of {', '.join(texture_maps.RATIOS)} there (as {', '.join(texture_maps.SUFFIXES)})"
         )
     ratios = {}
-    for name, file in found.items():
+    for name, file in file_of_ratio.items():
         values = texture_maps.ratio(file)
         if values.size == 0 or values.min() < 0:
             raise InputError(f"map {file}: holds no ratios of 0 or more; mend it")

@@ -105,12 +105,12 @@ def profile_error(judged: Judge, recipe: Recipe) -> dict[str, float]:
     if not judged.with_profile:
         unscattered = judged.profiles.unscattered()
         return {"no profile": unscattered, "total": unscattered, "at most": unscattered}
-    found, rule = judged.profiles, recipe.wavelengths
+    profiles, rule = judged.profiles, recipe.wavelengths
     total = judged.profile(recipe)
     nothing = np.zeros((1, 1, 1, 1))
     return {
-        "quadrature": found.quadrature(rule), "interpolation": found.interpolation(rule, recipe.profile),
-        "rings": found.rings(recipe.rings), "noise": found.with_noise(nothing, rule, recipe.photons).likely,
+        "quadrature": profiles.quadrature(rule), "interpolation": profiles.interpolation(rule, recipe.profile),
+        "rings": profiles.rings(recipe.rings), "noise": profiles.with_noise(nothing, rule, recipe.photons).likely,
         "total": total.likely, "at most": total.certain,
     }  # fmt: skip
 
@@ -118,7 +118,7 @@ def profile_error(judged: Judge, recipe: Recipe) -> dict[str, float]:
 def why(judged: Judge, recipe: Recipe) -> tuple[str, ...]:
     """Five lines: totals, wavelengths, photons, color table, profile table."""
     needs, rungs = judged.needs, judge.ladder(recipe, judged.with_profile)
-    lower = {name: _would(judged, one) for name, one in rungs}
+    lower = {name: _would(judged, rung) for name, rung in rungs}
     alone = judged.colors.noise(recipe.wavelengths, recipe.photons)
     lines = [
         "totals: anchored, for a bake computes exact totals anyway to check itself, and with them color has no noise; "
@@ -151,8 +151,8 @@ def why(judged: Judge, recipe: Recipe) -> tuple[str, ...]:
 
 def _would(judged: Judge, recipe: Recipe) -> str:
     """What a rung down would err by: of color and profile that which is too much, else both."""
-    needs, found = judged.needs, judged.color(recipe)
-    parts = [(f"ΔE00 {_apart(found, needs.tolerance, 3)} of {needs.tolerance:g}", found / needs.tolerance)]
+    needs, delta_e00 = judged.needs, judged.color(recipe)
+    parts = [(f"ΔE00 {_apart(delta_e00, needs.tolerance, 3)} of {needs.tolerance:g}", delta_e00 / needs.tolerance)]
     if judged.with_profile:
         likely = judged.profile(recipe).likely
         shown = _apart(likely, needs.ee_tolerance, 2)
@@ -170,10 +170,10 @@ def nodes(grid: Grid) -> str:
     return " × ".join(str(axis.count) for axis in grid.axes[::-1])
 
 
-def unaffordable(judged: Judge, found: list[tuple[float, int]]) -> InputError:
+def unaffordable(judged: Judge, seconds_bytes: list[tuple[float, int]]) -> InputError:
     """What to raise where no recipe is within the bytes and seconds allowed: it says which tolerances are."""
     needs = judged.needs
-    spent = min(seconds for seconds, _ in found), min(size for _, size in found)
+    spent = min(seconds for seconds, _ in seconds_bytes), min(size for _, size in seconds_bytes)
     over = [
         f"{name} = {most:g}: {needs.tolerance:g} ΔE00 with EE {needs.ee_tolerance:.2g} takes {least}"
         for name, most, need, least in (

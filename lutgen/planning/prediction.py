@@ -58,11 +58,11 @@ class Colors:
     def quadrature(self, rule: str) -> float:
         """Error of a rule's wavelengths alone."""
         chosen = wavelengths.load(rule)
-        found = [
+        xyz = [
             exact_totals.spectra(self.exact, chosen.wavelength_nm, *self.skins, oxygenation) @ chosen.xyz_weights
             for oxygenation in self.needs.oxygenations
         ]
-        return self._worst(found, self.truth)
+        return self._worst(xyz, self.truth)
 
     def error(self, rule: str, grid: Grid) -> float:
         """Error of a LUT of exact colors: wavelengths and interpolation."""
@@ -83,16 +83,16 @@ class Colors:
     def noise(self, rule: str, photons: int) -> float:
         """What totals that are not anchored would err by, by a draw of the noise of each skin and wavelength."""
         chosen, rng = wavelengths.load(rule), np.random.default_rng(SEED)
-        nm, found, right = chosen.wavelength_nm, [], []
+        nm, noisy_xyz, right = chosen.wavelength_nm, [], []
         nu = np.minimum(chromophores.epidermis_range(nm)[0], chromophores.dermis_range(nm)[0])[:, None]
         entry = 1 - specular(self.exact.tissue.refractive_index)
         for oxygenation in self.needs.oxygenations:
             mu = expand.coefficients(nm, expand.absorbers(nm, oxygenation), *self.skins)
             R, doubled = self.exact(nm, *mu), self.exact(nm, *(2 * v - nu for v in mu))
             sigma = np.sqrt(np.maximum(entry * doubled - R**2, 0) / photons)
-            found.append((R + sigma * rng.standard_normal(R.shape)).T @ chosen.xyz_weights)
+            noisy_xyz.append((R + sigma * rng.standard_normal(R.shape)).T @ chosen.xyz_weights)
             right.append(color.lab(R.T @ chosen.xyz_weights))
-        return self._worst(found, right)
+        return self._worst(noisy_xyz, right)
 
     def cells(self, rule: str, grid: Grid) -> list[np.ndarray]:
         """Exact XYZ [N_h, N_e, N_m, 3] of every node, per oxygenation."""
@@ -100,12 +100,12 @@ class Colors:
         nm = chosen.wavelength_nm[:, None]
         m, e = np.meshgrid(grid.melanin.values, grid.eumelanin.values)
         mu_e = chromophores.epidermis(nm, m.ravel(), e.ravel())
-        found = []
+        xyz = []
         for oxygenation in self.needs.oxygenations:
             mu_d = chromophores.dermis(nm, grid.hemoglobin.values, oxygenation)
             R = self.exact.grid(chosen.wavelength_nm, mu_e, mu_d)
-            found.append(np.einsum("ked,kc->dec", R, chosen.xyz_weights).reshape(*grid.shape, 3))
-        return found
+            xyz.append(np.einsum("ked,kc->dec", R, chosen.xyz_weights).reshape(*grid.shape, 3))
+        return xyz
 
     def _worst(self, xyz: list[np.ndarray], truth: list[np.ndarray]) -> float:
         return max(p95(color.delta_e00(color.lab(v), lab)) for v, lab in zip(xyz, truth, strict=True))
@@ -208,12 +208,12 @@ class Profiles:
         """Encircled energy [O, P, 3, B + 1] at the skins themselves, and total ACEScg [O, P, 3]."""
         if ("own", rule) not in self._cache:
             table, weights = stored_paths.stored(rule)
-            found = []
+            ring_energy = []
             for oxygenation in self.needs.oxygenations:
                 absorb = expand.absorbers(table.wavelength_nm, oxygenation)
                 mu = expand.coefficients(table.wavelength_nm, absorb, *self.skins)
-                found.append(np.einsum("kbp,kc->pcb", table.evaluate(*mu), weights, optimize=True))
-            energy = np.maximum(found, 0)
+                ring_energy.append(np.einsum("kbp,kc->pcb", table.evaluate(*mu), weights, optimize=True))
+            energy = np.maximum(ring_energy, 0)
             self._cache["own", rule] = profiles.encircled(energy), energy.sum(axis=-1)
         return self._cache["own", rule]
 
@@ -221,12 +221,12 @@ class Profiles:
         """Encircled energy [O, P, 3, B + 1] interpolated between a grid's nodes."""
         if ("between", rule, grid) not in self._cache:
             table, weights = stored_paths.stored(rule)
-            found = []
+            shapes = []
             for oxygenation in self.needs.oxygenations:
                 absorb = expand.absorbers(table.wavelength_nm, oxygenation)
                 shape, _ = expand.profile_cells(table, grid, absorb, weights)
-                found.append(grid.interpolate(shape, *self.skins).swapaxes(1, 2))
-            self._cache["between", rule, grid] = profiles.encircled(np.array(found))
+                shapes.append(grid.interpolate(shape, *self.skins).swapaxes(1, 2))
+            self._cache["between", rule, grid] = profiles.encircled(np.array(shapes))
         return self._cache["between", rule, grid]
 
     def _unit_noise(self, rule: str) -> np.ndarray:
@@ -249,15 +249,15 @@ class Profiles:
             )
             S, R = at_radii.shape[:2]
             flat = at_radii.reshape(S * R, -1).astype("f4")
-            found = np.empty((S, len(mu), len(self.skins[0]), 3, R), "f4")
+            unit_noise = np.empty((S, len(mu), len(self.skins[0]), 3, R), "f4")
             for o, pair in enumerate(mu):
                 to_e, to_d = (
                     stored_paths.interpolation_matrix(root, np.cbrt(v)) for root, v in zip(roots, pair, strict=True)
                 )
                 weight = np.einsum("kpi,kpj,kc,pc->kijpc", to_e, to_d, weights, 1 / totals_[o], optimize=True)
                 values = flat @ weight.reshape(flat.shape[1], -1).astype("f4")
-                found[:, o] = values.reshape(S, R, -1, 3).transpose(0, 2, 3, 1)
-            self._cache["noise", rule] = found
+                unit_noise[:, o] = values.reshape(S, R, -1, 3).transpose(0, 2, 3, 1)
+            self._cache["noise", rule] = unit_noise
         return self._cache["noise", rule]
 
 

@@ -27,9 +27,9 @@ MOST_NODES = 64
 
 def candidates(judged: Judge) -> Iterator[Recipe]:
     """Recipes that hold: per rule the least color table, and profile tables from coarse with many photons to fine."""
-    needs, found, fewer = judged.needs, 0, ""
+    needs, yielded, fewer = judged.needs, 0, ""
     for rule in wavelengths.NAMES:
-        if found and (rule.endswith("nm") or _negligible(judged, fewer)):
+        if yielded and (rule.endswith("nm") or _negligible(judged, fewer)):
             return  # regular rules cost a multiple of the fitted ones
         fewer = rule
         color = least_color(judged, rule)
@@ -38,14 +38,14 @@ def candidates(judged: Judge) -> Iterator[Recipe]:
         base = Recipe(wavelengths=rule, totals="anchored", color=color)
         base = replace(base, skin=replace(base.skin, oxygenation=sum(needs.oxygenation) / 2))
         if not judged.with_profile:
-            found += 1
+            yielded += 1
             yield replace(base, photons=PHOTONS[0], rings=RINGS[0], profile=fixed(needs))
             continue
         rings = enough_rings(judged)
         of_rule = list(profiled(judged, base, rings))
         if of_rule and max(slack(judged, recipe) for recipe in of_rule) <= LEEWAY and rings < RINGS[-1]:
             of_rule += profiled(judged, base, 2 * rings)  # what rings no longer err by frees photons and nodes
-        found += len(of_rule)
+        yielded += len(of_rule)
         yield from of_rule
         if of_rule and all(judged.rungs(recipe).get("wavelengths", np.inf) <= LEEWAY for recipe in of_rule):
             return  # fewer wavelengths do, so more are never the least
@@ -139,8 +139,8 @@ def least_photons(judged: Judge, recipe: Recipe, most: int = PHOTONS[1]) -> Reci
 
     def holds(octave: float) -> bool:
         """Whether profiles of 2 ** octave photons keep their tolerance."""
-        found = judged.profiles.with_noise(off, recipe.wavelengths, 2**octave)
-        return found.certain <= PROFILE_MARGIN * judged.needs.ee_tolerance
+        spread = judged.profiles.with_noise(off, recipe.wavelengths, 2**octave)
+        return spread.certain <= PROFILE_MARGIN * judged.needs.ee_tolerance
 
     least, high = np.log2(PHOTONS[0]), np.log2(most)
     if not holds(high):
@@ -185,7 +185,7 @@ def _pruned(grid: Grid, holds: Callable[[Grid], bool]) -> Grid:
     for axis in chromophores.NAMES:
         while (count := getattr(grid, axis).count) > 2:
             fewer = _respaced(resized(grid, axis, count - 1), axis)
-            coarser = next((one for one in fewer if holds(one)), None)
+            coarser = next((smaller for smaller in fewer if holds(smaller)), None)
             if coarser is None:
                 break
             grid = coarser

@@ -111,11 +111,11 @@ def verify(
         sets = [luts if o == luts.oxygenation else luts.expand(oxygenation=o) for o in needs.oxygenations]
         if first is None:
             first, seconds = sets, luts.manifest["seconds"]["trace"]
-        colors.append(np.array([_color_errors(one, right, o) for o, one in enumerate(sets)]))
-        shapes.append(np.array([_profile_errors(one, right, o, with_profile) for o, one in enumerate(sets)]))
+        colors.append(np.array([_color_errors(lut_set, right, o) for o, lut_set in enumerate(sets)]))
+        shapes.append(np.array([_profile_errors(lut_set, right, o, with_profile) for o, lut_set in enumerate(sets)]))
         if stop and (_worst(colors[-1]) > needs.tolerance or _worst(shapes[-1]) > needs.ee_tolerance):
             break
-        noise.append(prediction.largest(np.array([_smooth(one, right) for one in sets]) - at_rule))
+        noise.append(prediction.largest(np.array([_smooth(lut_set, right) for lut_set in sets]) - at_rule))
     assert first
     parts = {"color": _color_parts(first, right, recipe)}
     if with_profile:
@@ -161,19 +161,19 @@ def _profile_errors(luts: LutSet, right: Truth, o: int, with_profile: bool) -> n
 
 def _color_parts(sets: list[LutSet], right: Truth, recipe: Recipe) -> dict[str, float]:
     """Errors of wavelengths, of interpolation and of noise, each alone, of the first bake."""
-    rule, found = wavelengths.load(recipe.wavelengths), {"quadrature": [], "interpolation": [], "noise": []}
+    rule, errors = wavelengths.load(recipe.wavelengths), {"quadrature": [], "interpolation": [], "noise": []}
     for o, luts in enumerate(sets):
-        at = right.needs.oxygenations[o]
+        oxygenation = right.needs.oxygenations[o]
         nm, grid = rule.wavelength_nm, recipe.color
-        own = color.lab(exact_totals.spectra(right.exact, nm, *right.color_skins, at) @ rule.xyz_weights)
+        own = color.lab(exact_totals.spectra(right.exact, nm, *right.color_skins, oxygenation) @ rule.xyz_weights)
         melanin, eumelanin, hemoglobin = (v.ravel() for v in grid.nodes())
-        cells = exact_totals.spectra(right.exact, nm, melanin, eumelanin, hemoglobin, at) @ rule.xyz_weights
+        cells = exact_totals.spectra(right.exact, nm, melanin, eumelanin, hemoglobin, oxygenation) @ rule.xyz_weights
         between = color.lab(grid.interpolate(cells.reshape(*grid.shape, 3), *right.color_skins))
         read = color.lab(luts.color(*right.color_skins, space="xyz"))
         for name, pair in (("quadrature", (own, right.lab[o])), ("interpolation", (between, own)),
                            ("noise", (read, between))):  # fmt: skip
-            found[name].append(p95(color.delta_e00(*pair)))
-    return {name: max(values) for name, values in found.items()}
+            errors[name].append(p95(color.delta_e00(*pair)))
+    return {name: max(values) for name, values in errors.items()}
 
 
 def _smooth(luts: LutSet, right: Truth) -> np.ndarray:

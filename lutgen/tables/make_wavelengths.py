@@ -123,13 +123,13 @@ def color_rows(spectra: dict[str, np.ndarray], pipeline: str) -> dict[str, Rows]
     shares = {name: share for name, (_, _, share) in SPECTRA.items()} | {"white": WHITE_SHARE}
     rows = {}
     for name, values in (spectra | {"white": np.ones((1, len(EVERY_NM)))}).items():
-        xyz = values[:, at(REFERENCE_NM)] @ color.xyz_weights(5, pipeline)[1]
+        xyz = values[:, index_of(REFERENCE_NM)] @ color.xyz_weights(5, pipeline)[1]
         weight = np.full(len(xyz), shares[name] / len(xyz))
-        rows[name] = Rows(values[:, at(LATTICE_NM)], xyz, color_metric(xyz), weight)
+        rows[name] = Rows(values[:, index_of(LATTICE_NM)], xyz, color_metric(xyz), weight)
     return rows
 
 
-def at(wavelength_nm: np.ndarray) -> np.ndarray:
+def index_of(wavelength_nm: np.ndarray) -> np.ndarray:
     """Where these wavelengths stand in EVERY_NM."""
     return np.searchsorted(EVERY_NM, wavelength_nm)
 
@@ -167,13 +167,13 @@ def profile_rows(rings: np.ndarray, pipeline: str) -> Rows:
     """Spectra of the light within ten radii, wrong by its share of each ACEScg channel's total."""
     inside = np.cumsum(rings, axis=1)
     reference = color.xyz_weights(5, pipeline)[1]
-    total = inside[:, -1, at(REFERENCE_NM)] @ reference @ color.ACESCG_FROM_XYZ.T
+    total = inside[:, -1, index_of(REFERENCE_NM)] @ reference @ color.ACESCG_FROM_XYZ.T
     root = ENERGY_AS_COLOR * color.ACESCG_FROM_XYZ / total[:, :, None]
     within = inside[:, FIT_RINGS]
     metric = np.broadcast_to((root.transpose(0, 2, 1) @ root)[:, None], (*within.shape[:2], 3, 3)).reshape(-1, 3, 3)
     within = within.reshape(-1, len(EVERY_NM))
     weight = np.full(len(within), PROFILE_SHARE / len(within))
-    return Rows(within[:, at(LATTICE_NM)], within[:, at(REFERENCE_NM)] @ reference, metric, weight)
+    return Rows(within[:, index_of(LATTICE_NM)], within[:, index_of(REFERENCE_NM)] @ reference, metric, weight)
 
 
 def normal_equations(rows: dict[str, Rows]) -> tuple[np.ndarray, np.ndarray, float]:
@@ -259,9 +259,9 @@ def lines(
         for pipeline, (nm, weights) in rule.items():
             reference = color.xyz_weights(5, pipeline)[1]
             for setting, spectra in held.items():
-                pair = (spectra[:, at(nm)] @ weights, spectra[:, at(REFERENCE_NM)] @ reference)
+                pair = (spectra[:, index_of(nm)] @ weights, spectra[:, index_of(REFERENCE_NM)] @ reference)
                 yield f"# color,{name},{pipeline},{setting},{_worst(color.delta_e00(*map(color.lab, pair)))}"
-            energy = rings[:, :, at(nm)] @ weights, rings[:, :, at(REFERENCE_NM)] @ reference
+            energy = rings[:, :, index_of(nm)] @ weights, rings[:, :, index_of(REFERENCE_NM)] @ reference
             yield f"# profile,{name},{pipeline},default,{_worst(energy_difference(*energy))}"
     yield ",".join(["rule", "wavelength_nm", *(f"{p}_{axis}" for p in color.PIPELINES for axis in "xyz")])
     for name, (nm, weights) in chosen.items():

@@ -111,10 +111,12 @@ def test_profile_error_is_the_stored_one(monkeypatch):
     monkeypatch.setattr(make_wavelengths, "PHOTONS", 2**15)
     rings = make_wavelengths.ring_spectra(make_wavelengths.trace(seed=5), random_skins(50, seed=80))
     for pipeline in color.PIPELINES:
-        reference = rings[:, :, make_wavelengths.at(make_wavelengths.REFERENCE_NM)] @ color.xyz_weights(5, pipeline)[1]
+        reference = (
+            rings[:, :, make_wavelengths.index_of(make_wavelengths.REFERENCE_NM)] @ color.xyz_weights(5, pipeline)[1]
+        )
         for name in (*FITTED, "10nm"):
             rule = wavelengths.load(name, pipeline)
-            energy = rings[:, :, make_wavelengths.at(rule.wavelength_nm)] @ rule.xyz_weights
+            energy = rings[:, :, make_wavelengths.index_of(rule.wavelength_nm)] @ rule.xyz_weights
             most = make_wavelengths.energy_difference(energy, reference).max()
             assert 0.5 * rule.profile_error[1] <= most <= 1.5 * rule.profile_error[1]
 
