@@ -12,7 +12,7 @@ from lutgen.skin.tissue import REFRACTIVE_INDEX, specular
 
 gl, light = (importlib.import_module(f"lutgen.viewer.{n}") for n in ("gl", "light"))
 ROUGHNESS = (0.15, 0.2, 0.3, 0.323, 0.4, 0.6, 0.8, 1.0)
-"""Usual roughness from .2 to .8, both ends of the slider, and .323, where a table of 32 x 48^2 points was off by 0.9 %."""
+"""Roughness from .2 to .8, both ends of the slider, and .323, where a table of 32 x 48^2 points was off by 0.9 %."""
 
 
 @pytest.fixture(scope="module")
