@@ -51,6 +51,27 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def summary(self) -> str:
+    """The repr of a dataclass in a line of at most 200 characters: arrays by type and shape, no fields at defaults.
+
+    >>> import lutgen
+    >>> lutgen.preset("light")
+    Skin(melanin=0.0195, eumelanin=0.7, hemoglobin=0.0088)
+    """
+    from dataclasses import MISSING, fields  # loads `inspect`, which no command needs before its work
+
+    told = []
+    for field in fields(self):
+        value, factory = getattr(self, field.name), field.default_factory
+        default = field.default if factory is MISSING else factory()
+        if isinstance(shape := getattr(value, "shape", None), tuple) and hasattr(value, "dtype"):
+            told.append(f"{field.name}={value.dtype}{list(shape)}" if shape else f"{field.name}={value.item()}")
+        elif type(value) is not type(default) or value != default:
+            told.append(f"{field.name}={shown(value)}")
+    text = ", ".join(told)
+    return f"{type(self).__name__}({text if len(text) <= 180 else text[:177] + '...'})"
+
+
 def in_range(name: str, value: object, low: float, high: float, unit: str = "") -> float:
     """Return `value` as a float in [low, high]; raise InputError that names it otherwise (NaN included)."""
     try:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from lutgen import color
-from lutgen.errors import InputError
+from lutgen.errors import InputError, summary
 from lutgen.files import images
 
 RATIO_RANGE, SURFACE_RANGE, THICKNESS_MM = 4.0, 2.0, 32.0
@@ -39,6 +39,8 @@ class Maps:
     normal: np.ndarray | None = None
     albedo: np.ndarray | None = None
     full_contrast_melanin: float = 0.0292
+
+    __repr__ = summary
 
 
 def encode_ratio(ratio: np.ndarray) -> np.ndarray:

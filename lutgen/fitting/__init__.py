@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from lutgen import color
-from lutgen.errors import InputError, in_range, one_of, shown
+from lutgen.errors import InputError, in_range, one_of, shown, summary
 from lutgen.fitting import least_squares, measured, nearest
 from lutgen.fitting.measured import Measured
 from lutgen.fitting.nearest import CUBE_ROOT, PARAMETERS, Problem
@@ -60,6 +60,8 @@ class Fit:
     reflectance: np.ndarray
     xyz: np.ndarray
     notes: tuple[str, ...]
+
+    __repr__ = summary
 
 
 def fit(

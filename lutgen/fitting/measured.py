@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lutgen import color
-from lutgen.errors import InputError, numbers, shown
+from lutgen.errors import InputError, numbers, shown, summary
 from lutgen.skin.chromophores import WAVELENGTH_NM
 
 COLUMNS = ("wavelength_nm", "reflectance")
@@ -35,6 +35,8 @@ class Measured:
     wavelength_nm: np.ndarray | None = None
     reflectance: np.ndarray | None = None
     notes: tuple[str, ...] = ()
+
+    __repr__ = summary
 
 
 def read(source) -> Measured:

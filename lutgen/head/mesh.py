@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.errors import InputError, MachineError, in_range, missing
+from lutgen.errors import InputError, MachineError, in_range, missing, summary
 from lutgen.files import images
 
 SUFFIXES = (".glb", ".gltf", ".obj")
@@ -48,6 +48,8 @@ class Mesh:
     textures: dict[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     attribution: str = ""
+
+    __repr__ = summary
 
 
 def of(name: str, mm_per_unit: float | None = None, flip_v: bool = False) -> Mesh:

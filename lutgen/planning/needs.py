@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.errors import InputError, in_range, one_of, shown, whole
+from lutgen.errors import InputError, in_range, one_of, shown, summary, whole
 from lutgen.files import texture_maps
 from lutgen.skin import chromophores
 from lutgen.skin.tissue import PRESETS
@@ -47,6 +47,8 @@ class Needs:
     mm_per_pixel: float = 0.2
     bytes: int | None = None
     seconds: float | None = None
+
+    __repr__ = summary
 
     def __post_init__(self):
         def put(name: str, value: object) -> None:

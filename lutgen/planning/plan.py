@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lutgen.errors import InputError
+from lutgen.errors import InputError, summary
 from lutgen.planning import costs, judge, search
 from lutgen.planning.judge import Judge
 from lutgen.planning.needs import EE_TOLERANCE, TOLERANCE, Needs
@@ -40,6 +40,8 @@ class Plan:
     seconds: dict[str, float]
     bytes: dict[str, int]
     why: tuple[str, ...]
+
+    __repr__ = summary
 
     @property
     def cost(self) -> tuple[float, int]:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lutgen import color
-from lutgen.errors import InputError
+from lutgen.errors import InputError, summary
 from lutgen.render.compare_files import Picture, mask
 
 BOX = 4
@@ -65,6 +65,8 @@ class Difference:
     channels: tuple[Figure, ...]
     noise_over_sigma: float | None
     notes: tuple[str, ...]
+
+    __repr__ = summary
 
 
 def compare(a: Picture, b: Picture) -> Difference:

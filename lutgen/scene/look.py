@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lutgen.errors import InputError, cannot_write, in_range, one_of, shown
+from lutgen.errors import InputError, cannot_write, in_range, one_of, shown, summary
 from lutgen.skin import chromophores
 from lutgen.skin.tissue import PRESETS, preset
 
@@ -55,6 +55,8 @@ class Look:
     distance_mm: float = 610.0
     field_of_view: float = 23.0
     target_mm: tuple[float, float, float] = (0.0, -8.0, 0.0)
+
+    __repr__ = summary
 
     def __post_init__(self):
         for name, (low, high) in RANGES.items():

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from lutgen.errors import InputError, in_range, one_of, shown
+from lutgen.errors import InputError, in_range, one_of, shown, summary
 from lutgen.skin import chromophores
 
 LAWS = ("source", "bashkatov", "jacques", "saidi", "donner")
@@ -91,6 +91,8 @@ class Tissue:
     saidi_b_nm4_per_mm: float = 8.4e10
     refractive_index: float = REFRACTIVE_INDEX
 
+    __repr__ = summary
+
     def __post_init__(self):
         _hold_ranges(self, TISSUE_RANGES)
         one_of("scattering", self.scattering, LAWS)
@@ -111,6 +113,8 @@ class Skin(Tissue, Chromophores):
     >>> skin_of(preset("dark").chromophores, Tissue(epidermis_mm=0.06)).melanin
     0.158
     """
+
+    __repr__ = summary
 
     def __post_init__(self):
         Chromophores.__post_init__(self)

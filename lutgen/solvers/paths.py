@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lutgen.errors import InputError
+from lutgen.errors import InputError, summary
 
 PHOTONS = (1, 2**31 - 1)
 SEEDS = (0, 2**32 - 1)
@@ -61,6 +61,8 @@ class PathTable:
     energy: np.ndarray
     photons: int
     entry: float
+
+    __repr__ = summary
 
     def totals(self) -> PathTable:
         """The same table with all rings joined into one."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lutgen.errors import summary
+
 COMPARED_FROM_MM = 0.01
 """Profiles are compared from this radius on: what leaves nearer looks like a surface reflection."""
 
@@ -67,6 +69,8 @@ class Profile:
     radius_edges_mm: np.ndarray
     energy: np.ndarray
     std_error: np.ndarray
+
+    __repr__ = summary
 
     @property
     def total(self) -> np.ndarray:

@@ -126,6 +126,9 @@ class Grid:
     eumelanin: Axis
     hemoglobin: Axis
 
+    def __repr__(self) -> str:
+        return f"Grid({', '.join(f'{axis.count} {axis.name} {axis.low:g} to {axis.high:g}' for axis in self.axes)})"
+
     def __post_init__(self):
         for name in chromophores.NAMES:
             if getattr(self, name).name != name:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lutgen.color import ACESCG_FROM_XYZ
-from lutgen.errors import InputError, numbers, shown
+from lutgen.errors import InputError, numbers, shown, summary
 from lutgen.skin import chromophores
 from lutgen.solvers.paths import PathTable
 from lutgen.tables.axes import Grid
@@ -23,6 +23,8 @@ class Absorbers:
     oxygenation: float
     epidermis: np.ndarray
     dermis: np.ndarray
+
+    __repr__ = summary
 
 
 def absorbers(wavelength_nm: np.ndarray, oxygenation: float, extra: ExtraAbsorbers | None = None) -> Absorbers:

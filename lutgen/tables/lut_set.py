@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from lutgen import color
-from lutgen.errors import InputError, in_range, numbers, one_of, shown
+from lutgen.errors import InputError, in_range, numbers, one_of, shown, summary
 from lutgen.skin import chromophores
 from lutgen.skin.tissue import Skin, Tissue
 from lutgen.solvers import profiles
@@ -25,6 +25,8 @@ class ColorLut:
     grid: Grid
     acescg: np.ndarray
 
+    __repr__ = summary
+
 
 @dataclass(frozen=True)
 class ProfileLut:
@@ -34,6 +36,8 @@ class ProfileLut:
     radius_edges_mm: np.ndarray
     shape: np.ndarray
     clamped_share: np.ndarray
+
+    __repr__ = summary
 
     @cached_property
     def taps(self) -> np.ndarray:
@@ -55,6 +59,13 @@ class LutSet:
     profile_lut: ProfileLut
     paths: PathTable
     manifest: dict
+
+    def __repr__(self) -> str:
+        colors, profiles_ = (" x ".join(map(str, lut.grid.shape)) for lut in (self.color_lut, self.profile_lut))
+        rings = len(self.profile_lut.radius_edges_mm) - 1
+        traced = f"{len(self.paths.wavelength_nm)} wavelengths of {self.paths.photons:,} photons"
+        tables = f"{colors} colors, {profiles_} profiles of {rings} rings"
+        return f"LutSet({tables}, {traced}, oxygenation {self.oxygenation:g})"
 
     @cached_property
     def tissue(self) -> Tissue:

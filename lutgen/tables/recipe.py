@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 from lutgen.color import PIPELINES
-from lutgen.errors import InputError, one_of, shown, whole
+from lutgen.errors import InputError, one_of, shown, summary, whole
 from lutgen.skin import chromophores
 from lutgen.skin.tissue import Skin, Tissue, plain, require_one_scatterer
 from lutgen.solvers.paths import PHOTONS, SEEDS
@@ -41,6 +41,8 @@ class Recipe:
     color: Grid = field(default_factory=lambda: default_grid(16, 8, 16))
     profile: Grid = field(default_factory=lambda: default_grid(16, 4, 8))
     skin: Tissue = field(default_factory=Tissue)
+
+    __repr__ = summary
 
     def __post_init__(self):
         object.__setattr__(self, "photons", whole("photons", self.photons, *PHOTONS))

@@ -13,7 +13,7 @@ from importlib.resources import files
 import numpy as np
 
 from lutgen import color
-from lutgen.errors import one_of
+from lutgen.errors import one_of, summary
 
 NAMES = ("6", "8", "12", "10nm", "5nm")
 
@@ -31,6 +31,8 @@ class Quadrature:
     xyz_weights: np.ndarray
     color_error: tuple[float, float]
     profile_error: tuple[float, float]
+
+    __repr__ = summary
 
 
 def load(name: str, pipeline: str = "default") -> Quadrature:
