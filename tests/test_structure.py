@@ -153,7 +153,8 @@ def test_wheel_holds_one_name_and_its_data(tmp_path):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"lutgen"}
     for name in (
-        "kernels/solvers/path_table.cl", "luts/bake.toml", "luts/default/manifest.json", "luts/default/paths.exr",
+        "kernels/solvers/path_table.cl", "kernels/common/surface.cl", "viewer/shaders/lut.glsl",
+        "luts/bake.toml", "luts/default/manifest.json", "luts/default/paths.exr",
         "exports/templates/page.html", "exports/templates/gather.frag.glsl",
         "tables/quadrature.csv", "color_tables.csv", "skin/hemoglobin_prahl_1998.csv", "viewer/__init__.py",
         "planning/plan.csv", "planning/plan.exr",

@@ -1,1 +1,1 @@
-"""The interactive viewer; it may import only the NumPy modules of lutgen, never its device or solvers."""
+"""The interactive viewer; of lutgen it imports only NumPy modules, never its device."""

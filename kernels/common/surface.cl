@@ -1,4 +1,4 @@
-// Optics of a skin's surface, which OpenCL (renderer) and GLSL (viewer, exports) both read: what it reflects, what of the
+// Optics of a skin's surface, which OpenCL (renderer) and GLSL (viewer) both read: what it reflects, what of the
 // light enters, and what of it leaves. lutgen/scene/surface.py puts each language's words and the constants of a
 // refractive index before it, and has the same in NumPy, which tests compare both with. Everything is float.
 //

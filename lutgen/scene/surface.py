@@ -1,6 +1,6 @@
 """A skin's surface: what it reflects, lets in and lets out, as functions of its refractive index n.
 
-Renderer, viewer and exports read one text of it, kernels/common/surface.cl, with constants from here.
+Renderer and viewer read one text of it, kernels/common/surface.cl, with constants from here.
 """
 
 from __future__ import annotations
