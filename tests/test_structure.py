@@ -168,6 +168,8 @@ def test_no_lock_file_and_no_path_of_a_machine():
         "\n"
     )
     assert not {Path(name).name for name in listed} & {"uv.lock", "poetry.lock", "package-lock.json", "yarn.lock"}
+    paths = subprocess.run(["git", "grep", "-nIE", "/(work|root|home)/[a-z]"], cwd=ROOT, capture_output=True, text=True)
+    assert (paths.returncode, paths.stdout) == (1, "")  # 1: no line matches
     tops = {name.split("/")[0] for name in listed if name}
     assert {t for t in tops if not t.startswith(".")} <= {
         "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", "lutgen", "kernels", "viewer",
